@@ -1,0 +1,1 @@
+"""Analytic of ufl_origami."""

@@ -1,0 +1,41 @@
+"""Exceptions of the package: what is wrong with the input, and why a solve failed."""
+
+
+class InputError(ValueError):
+    """Input that cannot be simulated: the message names what is wrong and where."""
+
+
+class PatternError(InputError):
+    """A crease pattern that is not a valid set of panels and creases."""
+
+
+class MeshError(InputError):
+    """A mesh that cannot carry the model: inverted, degenerate, open or untagged."""
+
+
+class SceneError(InputError):
+    """A scene that is incomplete or contradicts itself: unknown name, missing value."""
+
+
+class SolveError(RuntimeError):
+    """A solve that did not converge.
+
+    Attributes:
+        reason: one line that says why (solver's own reason, smallest step, indefinite tangent).
+        load_factor: load factor (or time) of the last accepted state.
+    """
+
+    def __init__(self, reason: str, load_factor: float | None = None):
+        """Store the reason and the load factor of the last accepted state."""
+        at = "" if load_factor is None else f" (last accepted state at {load_factor:g})"
+        super().__init__(reason + at)
+        self.reason = reason
+        self.load_factor = load_factor
+
+
+class MeshWarning(UserWarning):
+    """A mesh that the chosen form represents poorly: the message holds the measured figure."""
+
+
+class StabilityWarning(UserWarning):
+    """An accepted equilibrium with negative directions of the tangent: it is unstable."""

@@ -1,0 +1,1 @@
+"""Terms of ufl_origami."""
