@@ -1,1 +1,5 @@
-"""Gallery of ufl_origami."""
+"""Ready-made crease patterns."""
+
+from ufl_origami.gallery.z_fold import z_fold
+
+__all__ = ["z_fold"]
