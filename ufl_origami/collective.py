@@ -1,13 +1,16 @@
 """Work done on rank 0 whose failure must reach every rank."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 from mpi4py import MPI
 
 from ufl_origami.errors import InputError
 
+T = TypeVar("T")
 
-def on_rank0[T](comm: MPI.Comm, function: Callable[[], T]) -> T | None:
+
+def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
     """Call the function on rank 0 and return its value there, None on the other ranks.
 
     Args:

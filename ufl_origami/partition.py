@@ -1,7 +1,8 @@
 """Distribution of triangles over the ranks, right also where more than two panels meet at an edge.
 
-The cells round an edge of more than two triangles become one node of the graph that is cut, so that
-they share a rank; every other edge that the cut crosses gives its two cells to both ranks.
+The cells round an edge of more than two triangles, and those at a vertex where parts of the sheet
+touch without a common edge, become one node of the graph that is cut: they share a rank. Every
+other edge that the cut crosses gives its two cells to both ranks.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from mpi4py import MPI
 
 import numpy as np
 import scipy.sparse
+import scipy.sparse.csgraph
 from dolfinx import cpp, graph
 
 from ufl_origami.errors import MeshError
@@ -23,12 +25,14 @@ class EdgeTable:
     """Edges of a triangle mesh, numbered in the order of their sorted vertex pairs.
 
     Attributes:
+        triangles: (m, 3) vertices of each triangle.
         vertices: (ne, 2) vertices of each edge, the smaller index first.
         of_triangle: (m, 3) edge opposite to each vertex of each triangle.
         count: (ne,) number of triangles at each edge.
         forward: (m, 3) whether the triangle runs through its edge from the smaller index up.
     """
 
+    triangles: np.ndarray
     vertices: np.ndarray
     of_triangle: np.ndarray
     count: np.ndarray
@@ -69,23 +73,45 @@ def edge_table(triangles: np.ndarray) -> EdgeTable:
     keys = pair_keys(np.stack([start, end], axis=-1).reshape(-1, 2), max(base, 1))
     unique, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
     vertices = np.stack(np.divmod(unique, max(base, 1)), axis=1)
-    return EdgeTable(vertices, inverse.reshape(-1, 3), count, start < end)
+    return EdgeTable(triangles, vertices, inverse.reshape(-1, 3), count, start < end)
+
+
+def pinched_vertices(table: EdgeTable) -> np.ndarray:
+    """Return the vertices whose triangles fall in parts that have no edge at the vertex in common.
+
+    dolfinx would number such a vertex twice if the parts were on two ranks.
+    """
+    corners = 3 * len(table.triangles)
+    corner = np.repeat(np.arange(corners), 2)
+    edge = table.of_triangle[:, [1, 2, 2, 0, 0, 1]].ravel()
+    vertex = table.triangles.ravel()
+    half_edge = 2 * edge + (table.vertices[edge, 1] == vertex[corner])
+    label = _components(corner, corners + half_edge, corners + 2 * len(table.count))[:corners]
+    fans = np.unique(np.stack([vertex, label], axis=1), axis=0)[:, 0]
+    return np.flatnonzero(np.bincount(fans) > 1)
 
 
 def merge_cells(table: EdgeTable) -> tuple[int, np.ndarray]:
     """Return the number of groups and the group of each cell.
 
-    Cells that share an edge of more than two triangles are in one group.
+    Cells that share an edge of more than two triangles or a pinched vertex are in one group.
     """
-    cells, ne = len(table.of_triangle), len(table.count)
-    flat = table.of_triangle.ravel()
-    at = np.flatnonzero(table.count[flat] > 2)
-    links = scipy.sparse.coo_array(
-        (np.ones(len(at)), (at // 3, cells + flat[at])), shape=(cells + ne, cells + ne)
+    cells, ne = table.of_triangle.shape[0], len(table.count)
+    crowded = np.flatnonzero(table.count[table.of_triangle.ravel()] > 2)
+    pinched = np.flatnonzero(np.isin(table.triangles.ravel(), pinched_vertices(table)))
+    hub = np.concatenate(
+        [table.of_triangle.ravel()[crowded], ne + table.triangles.ravel()[pinched]]
     )
-    _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
-    unique, group = np.unique(label[:cells], return_inverse=True)
+    size = cells + ne + 1 + int(table.triangles.max(initial=-1))
+    label = _components(np.concatenate([crowded, pinched]) // 3, cells + hub, size)[:cells]
+    unique, group = np.unique(label, return_inverse=True)
     return len(unique), group
+
+
+def _components(start: np.ndarray, end: np.ndarray, size: int) -> np.ndarray:
+    """Return the connected component (size,) of each node of a graph with links start-end."""
+    links = scipy.sparse.coo_array((np.ones(len(start), dtype=np.int8), (start, end)), (size, size))
+    return scipy.sparse.csgraph.connected_components(links, directed=False)[1]
 
 
 def cut(groups: int, pairs: np.ndarray, nparts: int, partitioner: GraphPartitioner) -> np.ndarray:

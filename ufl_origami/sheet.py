@@ -16,7 +16,7 @@ from dolfinx import cpp, fem, graph, mesh
 
 from ufl_origami import mesh_checks
 from ufl_origami.collective import on_rank0
-from ufl_origami.errors import InputError
+from ufl_origami.errors import InputError, MeshError
 from ufl_origami.partition import (
     EdgeTable,
     GraphPartitioner,
@@ -98,7 +98,7 @@ class SheetMesh:
         return graph.adjacencylist((cell // 3).astype(np.int32), offsets)
 
     def edge_vertices(self) -> np.ndarray:
-        """Return (nf, 2) vertices of each facet, in the direction of its first cell (edge_cells)."""
+        """Return (nf, 2) vertices of each facet, directed as in its first cell (edge_cells)."""
         slot, facet = self._sorted_incidence()
         _, first = np.unique(facet, return_index=True)
         cell, e = np.divmod(slot[first], 3)
@@ -147,6 +147,7 @@ class _Tags:
     """Names of the input in the input's numbering, small enough for every rank."""
 
     base: int
+    num_edges: int
     panel: np.ndarray
     panel_names: tuple[str, ...]
     edges: dict[str, np.ndarray]
@@ -241,7 +242,7 @@ def _checked_input(nparts: int, vertices, triangles, names: _Names, partitioner)
     mesh_checks.check_interior(x, cells, table, mesh_checks.check_creases(table, index, creases))
     index.setdefault("boundary", np.flatnonzero(table.count == 1))
     keys = {k: pair_keys(table.vertices[v], len(x)) for k, v in index.items()}
-    tags = _Tags(len(x), panel, panel_names, keys, creases, points)
+    tags = _Tags(len(x), len(table.count), panel, panel_names, keys, creases, points)
     ranks, offsets = _ranks(table, nparts, partitioner)
     return _Input(x, cells, ranks, offsets, tags)
 
@@ -261,6 +262,7 @@ def _distribute(comm: MPI.Comm, given: _Input, tags: _Tags) -> SheetMesh:
     msh.topology.create_connectivity(2, 1)
     msh.topology.create_connectivity(1, 2)
     V = fem.functionspace(msh, ("Lagrange", 1, (3,)))
+    _check_numbering(V, tags)
     cells = np.array(V.dofmap.list, dtype=np.int32)
     vertex_map = V.dofmap.index_map
     node = np.empty(vertex_map.size_local + vertex_map.num_ghosts, dtype=np.int64)
@@ -283,6 +285,17 @@ def _distribute(comm: MPI.Comm, given: _Input, tags: _Tags) -> SheetMesh:
         input_vertex=input_vertex,
         input_cell=input_cell,
     )
+
+
+def _check_numbering(V: fem.FunctionSpace, tags: _Tags) -> None:
+    """Check that no vertex and no edge was numbered twice when the mesh was split."""
+    vertices = V.dofmap.index_map.size_global
+    edges = V.mesh.topology.index_map(1).size_global
+    if (vertices, edges) != (tags.base, tags.num_edges):
+        raise MeshError(
+            f"the split mesh has {vertices} vertices and {edges} edges, the input {tags.base} and"
+            f" {tags.num_edges}: this partition cannot be numbered"
+        )
 
 
 def _local_edges(tags: _Tags, corners: np.ndarray, cell_edges: np.ndarray) -> dict[str, np.ndarray]:
