@@ -1,0 +1,32 @@
+"""The one module that knows the dolfinx version (0.9 and later)."""
+
+import dolfinx
+import numpy as np
+from dolfinx import cpp, fem
+
+VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+
+
+def constants_and_coefficients(form: fem.Form):
+    """Packed constants and coefficients of a form, as the assemblers of dolfinx take them."""
+    return (
+        cpp.fem.pack_constants(form._cpp_object),
+        cpp.fem.pack_coefficients(form._cpp_object),
+    )
+
+
+def assemble_scalar(form: fem.Form) -> float:
+    """This rank's share of a functional."""
+    return fem.assemble_scalar(form)
+
+
+def add_vector(form: fem.Form, out: np.ndarray) -> None:
+    """Add a linear form to local values (owned and ghost unknowns of its space)."""
+    constants, coefficients = constants_and_coefficients(form)
+    cpp.fem.assemble_vector(out, form._cpp_object, constants, coefficients)
+
+
+def add_matrix(form: fem.Form, matrix) -> None:
+    """Add a bilinear form to a PETSc matrix by its local-to-global map, entry by entry."""
+    constants, coefficients = constants_and_coefficients(form)
+    cpp.fem.petsc.assemble_matrix(matrix, form._cpp_object, constants, coefficients, [], True)

@@ -1,0 +1,58 @@
+"""Prescribed unknowns: which entries of the vector follow a function of the load factor."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ufl_origami.configuration import Configuration
+from ufl_origami.errors import SceneError
+
+Values = Callable[[float], np.ndarray]
+
+
+class Constraints:
+    """Prescribed unknowns of a scene (this rank's owned ones).
+
+    Args:
+        configuration: numbering of the unknowns.
+    """
+
+    def __init__(self, configuration: Configuration):
+        self.configuration = configuration
+        self._parts: list[tuple[np.ndarray, np.ndarray, Values, str]] = []
+        self.dofs = np.empty(0, dtype=np.int64)
+
+    def add(self, local: np.ndarray, values: Values, label: str) -> None:
+        """Prescribe local unknowns (n,); values(time) gives (n,) or a number.
+
+        Args:
+            local: local indices; those owned by other ranks are left to them.
+            values: function of the load factor or time.
+            label: name for error messages.
+        """
+        position = self.configuration.global_ids[local] - self.configuration.offset
+        owned = np.flatnonzero((position >= 0) & (position < self.configuration.size_local))
+        self._parts.append((position[owned], owned, values, label))
+        self.dofs = np.unique(np.concatenate([self.dofs, position[owned]])).astype(np.int64)
+
+    def values(self, time: float) -> np.ndarray:
+        """Prescribed values of `dofs` at a load factor or time.
+
+        Raises:
+            SceneError: two conditions prescribe different values, or a value is not finite.
+        """
+        result = np.full(len(self.dofs), np.nan)
+        for position, owned, values, label in self._parts:
+            given = np.asarray(values(time), dtype=float)
+            given = given[owned] if given.ndim else np.full(len(owned), float(given))
+            if not np.isfinite(given).all():
+                raise SceneError(f"condition {label!r} at {time:g}: value is not finite")
+            at = np.searchsorted(self.dofs, position)
+            clash = np.isfinite(result[at]) & ~np.isclose(result[at], given, rtol=1e-12, atol=1e-14)
+            if clash.any():
+                raise SceneError(
+                    f"condition {label!r} at {time:g}: value {given[clash][0]:g} contradicts "
+                    f"{result[at][clash][0]:g} prescribed before on the same vertex"
+                )
+            result[at] = given
+        return result

@@ -1,0 +1,120 @@
+"""Sum of terms under constraints: potential energy, residual and tangent of one scene."""
+
+from collections.abc import Sequence
+
+from petsc4py import PETSc
+
+import numpy as np
+
+from ufl_origami.assembly import Tangent
+from ufl_origami.configuration import Configuration, State
+from ufl_origami.constraints import Constraints
+from ufl_origami.terms.base import Term
+
+
+class Problem:
+    """Owns the terms, the constraints and the matrix; knows no physics.
+
+    Args:
+        configuration: numbering of the unknowns.
+        terms: contributions to the energy.
+        constraints: prescribed unknowns.
+
+    Attributes:
+        time: load factor or time to which the terms are set.
+        force_scale: largest norm of one term's forces at the last evaluation of `forces`.
+    """
+
+    def __init__(
+        self, configuration: Configuration, terms: Sequence[Term], constraints: Constraints
+    ):
+        self.configuration = configuration
+        self.terms = list(terms)
+        self.constraints = constraints
+        self.tangent = Tangent(configuration, self.terms)
+        self.time = 0.0
+        self.force_scale = 0.0
+        self._part = configuration.create_vector()
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent is symmetric."""
+        return all(term.symmetric for term in self.terms)
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all forces have an energy."""
+        return all(term.conservative for term in self.terms)
+
+    def set_time(self, time: float) -> None:
+        """Set loads, rest angles and prescribed normals to a load factor or time."""
+        self.time = time
+        for term in self.terms:
+            term.set_time(time)
+
+    def state(self, vector: PETSc.Vec) -> State:
+        """Local view of a vector of unknowns at the current time."""
+        return self.configuration.state(vector, self.time)
+
+    def energies(self, vector: PETSc.Vec) -> dict[str, float]:
+        """Energy by kind, summed over ranks."""
+        state = self.state(vector)
+        local: dict[str, float] = {}
+        for term in self.terms:
+            for kind, value in zip(term.kinds, term.energies(state), strict=True):
+                local[kind] = local.get(kind, 0.0) + value
+        total = self.configuration.sum(list(local.values()))
+        return dict(zip(local, map(float, total), strict=True))
+
+    def potential(self, vector: PETSc.Vec) -> float:
+        """Total potential energy, the loads' share included."""
+        return sum(self.energies(vector).values())
+
+    def forces(self, vector: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Gradient of the potential without constraints; at a support this is the reaction."""
+        state = self.state(vector)
+        out.set(0.0)
+        norms = [0.0]
+        for term in self.terms:
+            local = np.zeros(self.configuration.num_local)
+            term.add_residual(state, local)
+            part = self._part
+            part.set(0.0)
+            self.configuration.add_to_global(local, part)
+            norms.append(part.norm())
+            out.axpy(1.0, part)
+        self.force_scale = max(norms)
+
+    def residual(self, vector: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Gradient of the potential; on prescribed unknowns the distance from their values."""
+        self.forces(vector, out)
+        dofs = self.constraints.dofs
+        out.array_w[dofs] = vector.array_r[dofs] - self.constraints.values(self.time)
+
+    def linearise(self, previous: PETSc.Vec | None, current: PETSc.Vec) -> None:
+        """Fix the stress of the next tangent (see Term.linearise)."""
+        before = None if previous is None else self.state(previous)
+        now = self.state(current)
+        for term in self.terms:
+            term.linearise(before, now)
+
+    def stiffness(self, vector: PETSc.Vec) -> PETSc.Mat:
+        """Tangent without constraints at a vector of unknowns."""
+        return self.tangent.assemble(self.state(vector))
+
+    def constrain(self, matrix: PETSc.Mat, known: PETSc.Vec | None, rhs: PETSc.Vec | None) -> None:
+        """Turn the prescribed rows and columns of a tangent into identity.
+
+        Args:
+            matrix: the tangent, changed in place.
+            known: increments of the prescribed unknowns, moved to the right-hand side.
+            rhs: right-hand side, changed in place; both None for zero increments.
+        """
+        rows = (self.constraints.dofs + self.configuration.offset).astype(PETSc.IntType)
+        matrix.zeroRowsColumns(rows, 1.0, known, rhs)
+
+    def accept(self, vector: PETSc.Vec) -> None:
+        """Adopt a converged state (branches of the angles)."""
+        state = self.state(vector)
+        for term in self.terms:
+            term.accept(state)

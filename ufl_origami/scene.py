@@ -1,0 +1,281 @@
+"""A scene: a sheet, its materials and creases, and the named things done to it.
+
+A scene only declares. `Scene.build` makes exactly the terms and unknowns that it names.
+
+Values: a number or vector is proportional to the load factor (or time); a function of time is
+taken as it is. Displacement components may also be functions f(time, rest) of the rest
+coordinates (n, 3) of the vertices.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ufl_origami.errors import SceneError
+from ufl_origami.material import Material
+from ufl_origami.sheet import SheetMesh
+from ufl_origami.stencils import BENDING_FORMS
+from ufl_origami.terms.crease import CreaseLaw
+
+Scalar = float | Callable[..., np.ndarray | float]
+Vector = Sequence[float] | Callable[[float], np.ndarray]
+Pair = tuple[str, str]
+
+
+def scalar_function(value: Scalar, label: str) -> Callable[[float], float]:
+    """Function of time from a number (proportional to time) or a function.
+
+    Raises:
+        SceneError: the number is not finite.
+    """
+    if callable(value):
+        return value
+    if not np.isfinite(value):
+        raise SceneError(f"{label}: value {value} is not finite")
+    return lambda time: value * time
+
+
+def vector_function(value: Vector, label: str) -> Callable[[float], np.ndarray]:
+    """Function of time from a vector (proportional to time) or a function.
+
+    Raises:
+        SceneError: not three finite numbers.
+    """
+    if callable(value):
+        return value
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise SceneError(f"{label}: expected three finite numbers, got {value}")
+    return lambda time: vector * time
+
+
+@dataclass(frozen=True)
+class CreaseSpec:
+    """Spring of one crease between two of its panels (None: its only two)."""
+
+    name: str
+    law: CreaseLaw | None
+    stiffness: Scalar
+    rest_angle: Scalar | None
+    pair: Pair | None
+
+
+@dataclass(frozen=True)
+class MotionSpec:
+    """Prescribed displacement components (None: free) of a named point, edge set or panel."""
+
+    name: str
+    components: tuple[Scalar | None, Scalar | None, Scalar | None]
+
+
+@dataclass(frozen=True)
+class ClampSpec:
+    """Prescribed outward tangent of a boundary; None: that of the rest face.
+
+    Attributes:
+        name: boundary.
+        tangent: function of time and rest tangents (n, 3), giving (3,) or (n, 3), or None.
+        rest_tangent: tangent (3,) of the stress-free state, None: that of the rest face.
+    """
+
+    name: str
+    tangent: Callable[[float, np.ndarray], np.ndarray] | None
+    rest_tangent: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class LoadSpec:
+    """A load of one kind ("point", "line", "area", "pressure", "moment") on a named thing."""
+
+    kind: str
+    name: str
+    value: Callable
+
+
+@dataclass
+class Scene:
+    """Declaration of a simulation.
+
+    Args:
+        sheet: meshed sheet with its names.
+        material: one for all panels, or panel name -> material.
+        bending: "director" (default; tilt measure tan) or "averaged" (the paper's; sin).
+        measure: tilt measure "tan" or "sin", to override the form's own.
+        membrane: "kernel" (default, fused with bending) or "ufl" (the same energy as a form).
+
+    Raises:
+        SceneError: unknown bending form, measure, panel; panel without material.
+    """
+
+    sheet: SheetMesh
+    material: Material | Mapping[str, Material]
+    bending: str = "director"
+    measure: str | None = None
+    membrane: str = "kernel"
+    creases: list[CreaseSpec] = field(default_factory=list)
+    motions: list[MotionSpec] = field(default_factory=list)
+    clamps: list[ClampSpec] = field(default_factory=list)
+    loads: list[LoadSpec] = field(default_factory=list)
+    curvatures: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check names and fill in the form's own tilt measure."""
+        if self.bending not in BENDING_FORMS:
+            raise SceneError(f"bending {self.bending!r} is none of {BENDING_FORMS}")
+        if self.membrane not in ("kernel", "ufl"):
+            raise SceneError(f"membrane {self.membrane!r} is neither 'kernel' nor 'ufl'")
+        self.measure = self.measure or {"director": "tan", "averaged": "sin"}[self.bending]
+        if self.measure not in ("tan", "sin"):
+            raise SceneError(f"tilt measure {self.measure!r} is neither 'tan' nor 'sin'")
+        if isinstance(self.material, Mapping):
+            for name in self.material:
+                self.sheet.panel_cells(name)
+            missing = set(self.sheet.panel_names) - set(self.material)
+            if missing:
+                raise SceneError(f"panels without material: {sorted(missing)}")
+
+    def panel_material(self, panel: str) -> Material:
+        """Material of a panel."""
+        if isinstance(self.material, Mapping):
+            return self.material[panel]
+        return self.material
+
+    def crease(
+        self,
+        name: str,
+        stiffness: Scalar | None = None,
+        *,
+        rest_angle: Scalar | None = None,
+        law: CreaseLaw | None = None,
+        pair: Pair | None = None,
+    ) -> None:
+        """Give a crease its spring.
+
+        Args:
+            name: crease.
+            stiffness: K_r per unit length (moment per length and radian); a constant in time, or
+                a function of time; 0 is a free hinge, inf a stiff fold.
+            rest_angle: fold angle (radians, valley positive) without moment, a constant in time or
+                a function of time; default that of the rest state.
+            law: instead of stiffness and rest_angle, energy, moment and stiffness as functions.
+            pair: the two panels that the spring joins, for creases of more than two.
+
+        Raises:
+            SceneError: unknown crease, neither or both of stiffness and law, negative stiffness.
+        """
+        self.sheet.edge_facets(name)
+        if name not in self.sheet.creases:
+            raise SceneError(f"{name!r} is no crease; creases are {self.sheet.creases}")
+        if (stiffness is None) == (law is None):
+            raise SceneError(f"crease {name!r}: give a stiffness or a law, and only one of them")
+        if stiffness is not None and not callable(stiffness) and not stiffness >= 0:
+            raise SceneError(f"crease {name!r}: stiffness {stiffness} must not be negative")
+        for panel in pair or ():
+            self.sheet.panel_cells(panel)
+        self.creases.append(
+            CreaseSpec(name, law, 0.0 if stiffness is None else stiffness, rest_angle, pair)
+        )
+
+    def move(
+        self,
+        name: str,
+        x: Scalar | None = None,
+        y: Scalar | None = None,
+        z: Scalar | None = None,
+    ) -> None:
+        """Prescribe displacement components of a named point, edge set or panel.
+
+        Args:
+            name: point, edge set or panel.
+            x: displacement in x (see the module on values); None leaves it free.
+            y: displacement in y.
+            z: displacement in z.
+        """
+        self._require_place(name)
+        self.motions.append(MotionSpec(name, (x, y, z)))
+
+    def fix(self, name: str, components: str = "xyz") -> None:
+        """Hold displacement components of a named point, edge set or panel at zero."""
+        if not components or set(components) - set("xyz"):
+            raise SceneError(f"fix {name!r}: components {components!r} are not out of 'xyz'")
+        self.move(name, **{c: 0.0 for c in components})
+
+    def clamp(
+        self, name: str, tangent: Callable[[float, np.ndarray], np.ndarray] | None = None
+    ) -> None:
+        """Prescribe the direction in which the sheet leaves a boundary (its edge normal).
+
+        Args:
+            name: boundary edge set.
+            tangent: function of time and the rest outward tangents (n, 3), giving (n, 3) or (3,)
+                outward tangents; default: held as at rest.
+        """
+        self.sheet.edge_facets(name)
+        self.clamps.append(ClampSpec(name, tangent, None))
+
+    def symmetry(self, name: str, axis: str) -> None:
+        """Make a boundary the trace of a mirror plane normal to an axis ("x", "y" or "z")."""
+        if axis not in ("x", "y", "z"):
+            raise SceneError(f"symmetry {name!r}: axis {axis!r} is none of 'x', 'y', 'z'")
+        self.fix(name, axis)
+        normal = np.eye(3)["xyz".index(axis)]
+
+        def outward(time: float, rest: np.ndarray) -> np.ndarray:
+            return np.where(rest @ normal > 0, 1.0, -1.0)[:, None] * normal
+
+        self.clamps.append(ClampSpec(name, outward, normal))
+
+    def point_load(self, name: str, force: Vector) -> None:
+        """Dead force (3,) on a named point."""
+        self.sheet.point_vertex(name)
+        self._load("point", name, vector_function(force, f"point load {name!r}"))
+
+    def line_load(self, name: str, force: Vector) -> None:
+        """Dead force per rest length (3,) on a named edge set."""
+        self.sheet.edge_facets(name)
+        self._load("line", name, vector_function(force, f"line load {name!r}"))
+
+    def area_load(self, name: str, force: Vector) -> None:
+        """Dead force per rest area (3,) on a named panel."""
+        self.sheet.panel_cells(name)
+        self._load("area", name, vector_function(force, f"area load {name!r}"))
+
+    def pressure(self, name: str, pressure: Scalar) -> None:
+        """Follower pressure on a named panel, positive along its normal."""
+        self.sheet.panel_cells(name)
+        self._load("pressure", name, scalar_function(pressure, f"pressure {name!r}"))
+
+    def edge_moment(self, name: str, moment: Scalar) -> None:
+        """Moment per rest length on a boundary, lifting its outward tangent to the normal."""
+        self.sheet.edge_facets(name)
+        self._load("moment", name, scalar_function(moment, f"edge moment {name!r}"))
+
+    def natural_curvature(self, name: str, tensor: np.ndarray) -> None:
+        """Stress-free curvature of a panel, added to its rest shape.
+
+        Args:
+            name: panel.
+            tensor: symmetric (3, 3); t.K t is the normal curvature along a unit tangent t (1 /
+                length), positive where the sheet bends towards its normal.
+        """
+        self.sheet.panel_cells(name)
+        tensor = np.asarray(tensor, dtype=float)
+        if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
+            raise SceneError(f"natural curvature {name!r}: expected a symmetric (3, 3) tensor")
+        self.curvatures[name] = tensor
+
+    def _load(self, kind: str, name: str, value: Callable) -> None:
+        self.loads.append(LoadSpec(kind, name, value))
+
+    def _require_place(self, name: str) -> None:
+        if name not in self.sheet.points and name not in self.sheet.panel_names:
+            self.sheet.edge_facets(name)
+
+
+def displacement_function(value: Scalar, rest: np.ndarray, label: str):
+    """Function of time giving displacements (n,) of vertices with rest coordinates (n, 3)."""
+    if callable(value) and len(inspect.signature(value).parameters) > 1:
+        return lambda time: value(time, rest)
+    return scalar_function(value, label)

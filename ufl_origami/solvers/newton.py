@@ -1,0 +1,262 @@
+"""One equilibrium by PETSc SNES: Newton with full steps, inertia guard and watchdog.
+
+The default is full Newton steps with the mixed-integration-point tangent (Magisano, Leonetti,
+Garcea 2017, doi:10.1016/j.cma.2016.10.040): the membrane stress of the geometric stiffness is
+extrapolated from the iterate before. Every factorisation tells the inertia; where negative pivots
+show, a mass-weighted diagonal shift is raised until there are none. A watchdog follows a run of
+full steps that did not converge by a few steps with an energy line search.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+
+from ufl_origami.problem import Problem
+from ufl_origami.solvers.linear import Factorisation, linear_options
+from ufl_origami.solvers.options import option_scope
+
+FIRST_SHIFT = 1e-10
+"""First diagonal shift, over the largest ratio of tangent diagonal to weight."""
+
+REASONS = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """How one equilibrium is sought.
+
+    Attributes:
+        method: "default" (full steps, MIP tangent, guard, watchdog), "newton" (plain full steps)
+            or one of SNES's line searches by name ("bt", "l2", "cp") with the plain tangent.
+        rtol: residual norm over the largest norm of one term's forces.
+        iterations: full steps in one run.
+        cycles: runs of the watchdog, each with twice the line-search steps of the one before.
+        floor: tolerance floor in units of eps max K_ii max |x|.
+    """
+
+    method: str = "default"
+    rtol: float = 1e-9
+    iterations: int = 12
+    cycles: int = 4
+    floor: float = 30.0
+
+
+@dataclass
+class NewtonReport:
+    """What one solve did.
+
+    Attributes:
+        converged: whether the tolerance was met at an admissible state.
+        reason: SNES's reason or the package's own.
+        iterations: linear solves, the predictor included.
+        factorisations: factorisations, those of the guard included.
+        residuals: residual norm before each iteration.
+    """
+
+    converged: bool = False
+    reason: str = ""
+    iterations: int = 0
+    factorisations: int = 0
+    residuals: list[float] = field(default_factory=list)
+
+
+class NewtonSolver:
+    """SNES on a problem.
+
+    Args:
+        problem: terms and constraints.
+        settings: method and tolerances.
+        prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
+        options: PETSc options under that prefix.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        settings: NewtonSettings | None = None,
+        prefix: str = "ufl_origami_",
+        options: Mapping[str, object] | None = None,
+    ):
+        self.problem, self.settings = problem, settings or NewtonSettings()
+        self.prefix, self.options = prefix, dict(options or {})
+        self.report = NewtonReport()
+        self._residual_vector = problem.configuration.create_vector()
+        self._previous: PETSc.Vec | None = None
+        self._mip = self._guard = self.settings.method == "default"
+        self._shift_weights = shift_weights(problem)
+        self._shift, self._floor = 0.0, 0.0
+        own = {"default": "basic", "newton": "basic"}
+        self._full = self._create_snes(own.get(self.settings.method, self.settings.method))
+        self._careful: PETSc.SNES | None = None
+        self.linear = Factorisation(
+            self._full.getKSP(), problem.tangent.matrix, problem.symmetric
+        )
+
+    def _create_snes(self, line_search: str) -> PETSc.SNES:
+        matrix = self.problem.tangent.matrix
+        snes = PETSc.SNES().create(matrix.comm)
+        snes.setOptionsPrefix(self.prefix)
+        snes.setFunction(self._function, self._residual_vector.duplicate())
+        snes.setJacobian(self._jacobian, matrix, matrix)
+        snes.setConvergenceTest(self._converged)
+        if self.problem.conservative and line_search == "bt":
+            snes.setObjective(lambda _, x: self.problem.potential(x))
+        with self._scope(line_search):
+            snes.setFromOptions()
+            snes.getKSP().setOperators(matrix)
+            snes.getKSP().pc.setOperators(matrix)
+            snes.getKSP().pc.setFromOptions()
+        return snes
+
+    def _scope(self, line_search: str):
+        """Options of one of the solver's SNES, for as long as it works."""
+        defaults = {
+            "snes_type": "newtonls",
+            "snes_linesearch_type": line_search,
+            "snes_divergence_tolerance": 1e30,
+            **linear_options(self.problem.symmetric),
+        }
+        return option_scope(self.prefix, {**defaults, **self.options})
+
+    def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        self.problem.residual(x, out)
+
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix, _) -> None:
+        """Tangent at an iterate, factored and shifted where the guard asks for it."""
+        self.problem.linearise(self._previous if self._mip else None, x)
+        self.problem.stiffness(x)
+        self._set_floor(x)
+        self.problem.constrain(matrix, None, None)
+        self.factor(snes.getKSP())
+        if self._previous is None:
+            self._previous = x.duplicate()
+        x.copy(self._previous)
+
+    def _set_floor(self, x: PETSc.Vec) -> None:
+        """Round-off of the residual: eps max K_ii max |x|."""
+        diagonal = self.problem.tangent.matrix.getDiagonal()
+        rest = np.abs(self.problem.configuration.sheet.rest).max(initial=0.0)
+        size = self.problem.configuration.comm.allreduce(rest, op=MPI.MAX)
+        size += x.norm(PETSc.NormType.INFINITY)
+        eps = np.finfo(float).eps
+        self._floor = self.settings.floor * eps * diagonal.norm(PETSc.NormType.INFINITY) * size
+
+    def factor(self, ksp: PETSc.KSP) -> int | None:
+        """Factor the constrained tangent; with the guard, shift it until positive definite.
+
+        Returns:
+            Negative pivots of the tangent itself, None where unknown.
+        """
+        linear = Factorisation(ksp, self.problem.tangent.matrix, self.problem.symmetric)
+        found = linear.factor()
+        if self._guard and found:
+            self._raise_shift(linear)
+        self.report.factorisations += linear.count
+        return found
+
+    def _raise_shift(self, linear: Factorisation) -> None:
+        matrix = linear.matrix
+        diagonal = matrix.getDiagonal()
+        if not self._shift:
+            ratio = diagonal.copy()
+            ratio.pointwiseDivide(diagonal, self._shift_weights)
+            self._shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
+        shift = self._shift / 8
+        for _ in range(40):
+            matrix.setDiagonal(diagonal + shift * self._shift_weights)
+            if not linear.factor():
+                break
+            shift *= 8
+        self._shift = shift
+
+    def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
+        reason = PETSc.SNES.ConvergedReason
+        norm = norms[2]
+        self.report.residuals.append(norm)
+        if not np.isfinite(norm):
+            return reason.DIVERGED_FNORM_NAN
+        if norm <= max(self.settings.rtol * self.problem.force_scale, self._floor):
+            return reason.CONVERGED_FNORM_RELATIVE
+        return reason.CONVERGED_ITERATING
+
+    def _run(self, snes: PETSc.SNES, x: PETSc.Vec, iterations: int) -> bool:
+        snes.setTolerances(max_it=iterations)
+        snes.solve(None, x)
+        self.report.iterations += snes.getIterationNumber()
+        code = snes.getConvergedReason()
+        self.report.reason = REASONS.get(code, str(code))
+        return code > 0
+
+    def solve(self, x: PETSc.Vec, previous: PETSc.Vec | None = None) -> NewtonReport:
+        """Seek the equilibrium at the problem's time from x, in place.
+
+        Args:
+            x: start, with the prescribed unknowns at their values; the solution on return.
+            previous: the state from which a predictor led to x (for the MIP stress), or None.
+        """
+        self._previous = None if previous is None else previous.copy()
+        settings = self.settings
+        if settings.method != "default":
+            self.report.converged = self._run(self._full, x, 10 * settings.iterations)
+            return self.report
+        start = x.copy()
+        for cycle in range(settings.cycles):
+            if self._run(self._full, x, settings.iterations):
+                self.report.converged = True
+                return self.report
+            if cycle + 1 < settings.cycles and self._line_search(start, x, 4 * 2**cycle):
+                self.report.converged = True
+                return self.report
+        return self.report
+
+    def _line_search(self, start: PETSc.Vec, x: PETSc.Vec, iterations: int) -> bool:
+        """Watchdog: keep or go back, then steps with line search and the plain tangent."""
+        if not self._better(start, x):
+            start.copy(x)
+        if self._careful is None:
+            self._careful = self._create_snes("bt")
+        self._mip = False
+        try:
+            done = self._run(self._careful, x, iterations)
+        finally:
+            self._mip = True
+            self._previous = None
+        x.copy(start)
+        return done
+
+    def _better(self, start: PETSc.Vec, x: PETSc.Vec) -> bool:
+        """Whether x has the lower energy (the lower residual where there is no energy)."""
+        if self.problem.conservative:
+            new, old = self.problem.potential(x), self.problem.potential(start)
+        else:
+            new, old = self._norm(x), self._norm(start)
+        return bool(np.isfinite(new) and new < old)
+
+    def _norm(self, x: PETSc.Vec) -> float:
+        self.problem.residual(x, self._residual_vector)
+        return self._residual_vector.norm()
+
+
+def shift_weights(problem: Problem) -> PETSc.Vec:
+    """Mass-like weights: lumped area at vertices, area squared at edge unknowns (rest state)."""
+    configuration = problem.configuration
+    sheet = configuration.sheet
+    n = sheet.num_owned_cells
+    corners = sheet.rest[sheet.cells[:n]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(normal, axis=1)
+    local = np.zeros(configuration.num_local)
+    for k in range(3):
+        np.add.at(local, 3 * sheet.cells[:n].ravel() + k, np.repeat(area / 3, 3))
+    for name in configuration.edge_unknowns:
+        slot = configuration.slot(name)[sheet.cell_edges[:n]]
+        used = slot >= 0
+        weight = np.broadcast_to((area**2)[:, None], slot.shape)[used]
+        np.add.at(local, 3 * configuration.nv + slot[used], weight)
+    vector = configuration.create_vector()
+    configuration.add_to_global(local, vector)
+    return vector

@@ -1,0 +1,194 @@
+"""Static path: load stepping with automatic step size.
+
+Each step starts from the tangent predictor (prescribed motion enters through the tangent's
+columns, never by moving boundary vertices alone) and is corrected by Newton. The step grows while
+Newton is easy, is cut when it fails or ends at an inadmissible state, and the path gives up with a
+clear error at the smallest step. Each accepted state knows the inertia of its own tangent.
+"""
+
+import logging
+import time as clock
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from petsc4py import PETSc
+
+from ufl_origami.errors import SolveError, StabilityWarning
+from ufl_origami.problem import Problem
+from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StepSettings:
+    """Sizes of the load steps, in units of the load factor or time.
+
+    Attributes:
+        first: first step.
+        largest: largest step.
+        smallest: a step below this is given up.
+        growth: factor after an easy step.
+        easy: Newton iterations up to which a step is easy.
+    """
+
+    first: float = 0.125
+    largest: float = 1.0
+    smallest: float = 1e-5
+    growth: float = 1.5
+    easy: int = 9
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted step.
+
+    Attributes:
+        number: from 1.
+        time: load factor or time.
+        size: step size.
+        iterations: linear solves of Newton, the predictor included.
+        factorisations: factorisations of the step.
+        negative_pivots: inertia of the tangent at the state, None where unknown.
+        seconds: wall-clock time of the step.
+        cuts: failed tries before it.
+    """
+
+    number: int
+    time: float
+    size: float
+    iterations: int
+    factorisations: int
+    negative_pivots: int | None
+    seconds: float
+    cuts: int
+
+    @property
+    def stability(self) -> str:
+        """ "stable", "unstable" or "unknown"."""
+        if self.negative_pivots is None:
+            return "unknown"
+        return "unstable" if self.negative_pivots else "stable"
+
+
+OnAccept = Callable[[Step, PETSc.Vec], None]
+Check = Callable[[PETSc.Vec], str]
+
+
+@dataclass
+class StaticPath:
+    """Follows the equilibrium of a problem over the load factor.
+
+    Attributes:
+        problem: terms and constraints.
+        newton: solver of one equilibrium.
+        settings: step sizes.
+        check: returns why a converged state is inadmissible, or an empty string.
+        steps: accepted steps so far.
+    """
+
+    problem: Problem
+    newton: NewtonSolver
+    settings: StepSettings = field(default_factory=StepSettings)
+    check: Check | None = None
+    steps: list[Step] = field(default_factory=list)
+
+    def run(
+        self, x: PETSc.Vec, start: float, stops: Sequence[float], on_accept: OnAccept | None = None
+    ) -> list[Step]:
+        """Follow the path from an equilibrium at `start` through all stops.
+
+        Args:
+            x: unknowns at `start`; those of the last accepted state on return.
+            start: load factor or time of x.
+            stops: increasing load factors to be hit exactly.
+            on_accept: called with each accepted step and its unknowns.
+
+        Raises:
+            SolveError: a step below the smallest size failed; x is the last accepted state.
+        """
+        time, size = start, self.settings.first
+        self._factor_at(x, time)
+        for stop in stops:
+            while time < stop - 1e-12 * max(1.0, abs(stop)):
+                target = stop if time + 1.001 * size >= stop else time + size
+                step = self._advance(x, time, target)
+                time = step.time
+                if target != stop or step.cuts:
+                    size = step.size
+                if step.iterations <= self.settings.easy:
+                    size = min(self.settings.growth * size, self.settings.largest)
+                if on_accept:
+                    on_accept(step, x)
+        return self.steps
+
+    def _factor_at(self, x: PETSc.Vec, time: float) -> int | None:
+        """Factor the exact tangent at an accepted state; its inertia."""
+        self.problem.set_time(time)
+        self.problem.linearise(None, x)
+        matrix = self.problem.stiffness(x)
+        self.problem.constrain(matrix, None, None)
+        return self.newton.factor(self.newton.linear.ksp)
+
+    def _advance(self, x: PETSc.Vec, time: float, target: float) -> Step:
+        """One accepted step towards target, cut as often as needed."""
+        begin, cuts = clock.perf_counter(), 0
+        iterations = factorisations = 0
+        while True:
+            trial, report = self._try(x, time, target)
+            iterations += report.iterations
+            factorisations += report.factorisations
+            why = "" if report.converged else report.reason
+            if report.converged and self.check:
+                why = self.check(trial)
+            if not why:
+                break
+            size = 0.5 * (target - time)
+            log.info("step to %g failed (%s), cut to %g", target, why, size)
+            if size < self.settings.smallest:
+                raise SolveError(f"step below the smallest size {self.settings.smallest:g}: {why}", time)
+            target, cuts = time + size, cuts + 1
+            self._factor_at(x, time)
+        trial.copy(x)
+        self.problem.accept(x)
+        self.newton.report = NewtonReport()
+        negative = self._factor_at(x, target)
+        step = Step(
+            number=len(self.steps) + 1,
+            time=target,
+            size=target - time,
+            iterations=iterations,
+            factorisations=factorisations + self.newton.report.factorisations,
+            negative_pivots=negative,
+            seconds=clock.perf_counter() - begin,
+            cuts=cuts,
+        )  # fmt: skip
+        self.steps.append(step)
+        if negative:
+            text = f"state at {target:g} is unstable: {negative} negative pivots of the tangent"
+            warnings.warn(text, StabilityWarning, stacklevel=3)
+        return step
+
+    def _try(self, x: PETSc.Vec, time: float, target: float) -> tuple[PETSc.Vec, NewtonReport]:
+        """Predictor and Newton from an accepted state whose tangent is factored."""
+        self.newton.report = NewtonReport(iterations=1)
+        trial = self._predict(x, target)
+        return trial, self.newton.solve(trial, x)
+
+    def _predict(self, x: PETSc.Vec, target: float) -> PETSc.Vec:
+        """Linear solution of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
+        problem = self.problem
+        matrix = problem.tangent.insert(problem.state(x))
+        problem.set_time(target)
+        rhs, known = x.duplicate(), x.duplicate()
+        problem.forces(x, rhs)
+        rhs.scale(-1.0)
+        dofs = problem.constraints.dofs
+        known.set(0.0)
+        known.array_w[dofs] = problem.constraints.values(target) - x.array_r[dofs]
+        problem.constrain(matrix, known, rhs)
+        step = x.duplicate()
+        self.newton.linear.solve(rhs, step)
+        step.axpy(1.0, x)
+        return step

@@ -1,0 +1,75 @@
+"""What a term of the energy must answer: energy, residual, tangent.
+
+A term is written once and asked these questions by the problem, which knows no physics. A new
+energy is one subclass in this folder: `FormTerm` (see form.py) where UFL can say it, else a
+`StencilTerm` whose small dense blocks come from a kernel.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from ufl_origami.configuration import State
+
+
+class Term(ABC):
+    """One contribution to the potential energy.
+
+    Attributes:
+        kinds: names under which its energies are booked ("membrane", "crease", "load", ...).
+        conservative: False where no energy exists (follower loads, friction).
+        symmetric: whether the tangent is symmetric.
+    """
+
+    kinds: tuple[str, ...] = ()
+    conservative: bool = True
+    symmetric: bool = True
+
+    @abstractmethod
+    def energies(self, state: State) -> np.ndarray:
+        """Energies of this rank's share, one a kind, (len(kinds),)."""
+
+    @abstractmethod
+    def add_residual(self, state: State, out: np.ndarray) -> None:
+        """Add the energy's gradient (or minus the force) to local values (num_local,)."""
+
+    def set_time(self, time: float) -> None:
+        """Load factor or time to which loads, rest angles and prescribed normals are set."""
+
+    def linearise(self, previous: State | None, current: State) -> None:
+        """Fix what the next tangent takes from the last iterate (mixed-integration-point stress).
+
+        Args:
+            previous: the iterate before, or None: the tangent is then the exact Hessian.
+            current: the iterate at which the tangent will be formed.
+        """
+
+    def accept(self, state: State) -> None:
+        """Adopt a converged state as the branch against which angles are unwrapped."""
+
+    def history(self) -> dict[str, np.ndarray]:
+        """Arrays by name that a restart needs beside the unknowns (this rank's share)."""
+        return {}
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take back what `history` gave."""
+
+
+class StencilTerm(Term):
+    """A term that is a sum over small stencils, with dense tangent blocks."""
+
+    @abstractmethod
+    def stencils(self) -> list[np.ndarray]:
+        """Local unknowns of each batch of stencils: arrays (n, k) int32, -1 where unused."""
+
+    @abstractmethod
+    def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
+        """Write the Hessians of each batch into its block array (n, k, k)."""
+
+
+class MatrixTerm(Term):
+    """A term that adds its tangent into the assembled matrix itself (UFL forms)."""
+
+    @abstractmethod
+    def add_tangent(self, state: State, matrix) -> None:
+        """Add the tangent to a PETSc matrix by local indices."""

@@ -1,0 +1,101 @@
+"""Terms written in UFL: any functional of the displacement over the sheet's mesh."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ufl_origami import compat
+from ufl_origami.configuration import State
+from ufl_origami.sheet import SheetMesh
+from ufl_origami.terms.base import MatrixTerm
+
+JIT_OPTIONS = {"timeout": 300}
+
+
+@dataclass(frozen=True)
+class SheetFunctions:
+    """What the forms of a scene share.
+
+    Attributes:
+        sheet: the meshed sheet (rest state).
+        u: displacement, P1 vector function.
+        time: load factor or time, a constant.
+    """
+
+    sheet: SheetMesh
+    u: fem.Function
+    time: fem.Constant
+
+    @classmethod
+    def create(cls, sheet: SheetMesh) -> "SheetFunctions":
+        """Fresh displacement and time for a sheet."""
+        return cls(sheet, fem.Function(sheet.V), fem.Constant(sheet.mesh, 0.0))
+
+    def set(self, state: State) -> None:
+        """Copy a state into the functions."""
+        self.u.x.array[:] = state.q[: 3 * len(state.x)]
+        self.time.value = state.time
+
+    def piecewise(self, values: np.ndarray) -> fem.Function:
+        """Function that is constant on each triangle, from local values (nc,)."""
+        function = fem.Function(fem.functionspace(self.sheet.mesh, ("DG", 0)))
+        function.x.array[:] = values
+        return function
+
+
+def deformed_jacobian(u: fem.Function) -> tuple:
+    """Reference and current covariant bases as columns, (3, 2) each: J and J + grad(u) J."""
+    jacobian = ufl.Jacobian(ufl.extract_unique_domain(u))
+    return jacobian, jacobian + ufl.dot(ufl.grad(u), jacobian)
+
+
+class FormTerm(MatrixTerm):
+    """A UFL energy or force on the displacement.
+
+    Args:
+        kind: name under which the energy is booked.
+        functions: the scene's shared functions.
+        energy: UFL functional of functions.u, or None for a force without energy.
+        force: UFL linear form in TestFunction(V) (minus the force); derived from the energy
+            where that is given.
+
+    Raises:
+        ValueError: neither or both of energy and force are given.
+    """
+
+    def __init__(self, kind: str, functions: SheetFunctions, energy=None, force=None):
+        if (energy is None) == (force is None):
+            raise ValueError(f"term {kind!r}: give an energy or a force, and only one of them")
+        self.kinds = (kind,)
+        self.conservative = self.symmetric = energy is not None
+        self.functions = functions
+        residual = force if energy is None else ufl.derivative(energy, functions.u)
+        self._energy = None if energy is None else self._compile(energy)
+        self._residual = self._compile(residual)
+        tangent = ufl.algorithms.expand_derivatives(ufl.derivative(residual, functions.u))
+        self._tangent = None if tangent.empty() else self._compile(tangent)
+
+    @staticmethod
+    def _compile(form) -> fem.Form:
+        return fem.form(form, jit_options=JIT_OPTIONS)
+
+    def energies(self, state: State) -> np.ndarray:
+        """This rank's share of the functional; zero for a force without energy."""
+        if self._energy is None:
+            return np.zeros(1)
+        self.functions.set(state)
+        return np.array([compat.assemble_scalar(self._energy)])
+
+    def add_residual(self, state: State, out: np.ndarray) -> None:
+        """Add the assembled linear form to the displacement part of the local values."""
+        self.functions.set(state)
+        compat.add_vector(self._residual, out[: 3 * len(state.x)])
+
+    def add_tangent(self, state: State, matrix) -> None:
+        """Add the assembled derivative of the linear form; nothing for a linear energy."""
+        if self._tangent is None:
+            return
+        self.functions.set(state)
+        compat.add_matrix(self._tangent, matrix)

@@ -1,0 +1,206 @@
+"""Membrane and bending of the panels: the mid-edge shell on its stencil tables.
+
+W = h/8 |Abar^-1 (A - Abar)|^2 + h^3/24 |Abar^-1 (B - Bbar)|^2, each times twice the rest area, with
+the second fundamental form B a sum over the three tilts (Grinspun et al. 2006,
+doi:10.1111/j.1467-8659.2006.00974.x; the tilts of each form are in stencils.py).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ufl_origami import kernels
+from ufl_origami.configuration import Configuration, State
+from ufl_origami.stencils import ShellBatch
+from ufl_origami.terms.base import StencilTerm
+
+
+@dataclass(frozen=True)
+class PanelData:
+    """Elastic data of each local cell.
+
+    Attributes:
+        young: (nc,) Young's modulus.
+        poisson: (nc,) Poisson's ratio.
+        thickness: (nc,) thickness.
+        curvature: (nc, 3, 3) natural curvature added to the rest shape's, a symmetric tensor in
+            space whose value along a tangent t is t.K t, positive towards the panel's normal; or
+            None.
+    """
+
+    young: np.ndarray
+    poisson: np.ndarray
+    thickness: np.ndarray
+    curvature: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Ghosts:
+    """Ghost vertices of one clamped edge set within one batch.
+
+    Attributes:
+        rows: stencils of the batch (k,).
+        edges: their edge 0, 1, 2 (k,).
+        tangent: function of time: outward tangent of the continued surface (k, 3).
+    """
+
+    rows: np.ndarray
+    edges: np.ndarray
+    tangent: Callable[[float], np.ndarray]
+
+
+class _Batch:
+    """One group of stencils with its elastic data and work arrays."""
+
+    def __init__(self, table: ShellBatch, ghosts: list[Ghosts], configuration: Configuration):
+        self.table, self.ghosts = table, ghosts
+        self.dofs = table.dofs(configuration)
+        self.scatter = np.maximum(self.dofs, 0)
+        slot = np.ascontiguousarray(np.maximum(table.slot, 0), dtype=np.int32)
+        self.stencil = kernels.Stencil(
+            np.ascontiguousarray(table.verts, dtype=np.int32),
+            table.offset,
+            np.ascontiguousarray(table.c),
+            np.ascontiguousarray(table.d),
+            slot,
+        )
+        n, k = self.dofs.shape
+        self.theta, self.theta_ref, self.t = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self.s, self.energy, self.g = np.zeros((n, 3, 3)), np.zeros((n, 2)), np.zeros((n, k))
+        self.sigma = np.zeros((n, 3))
+
+    def place_ghosts(self, time: float) -> None:
+        for ghosts in self.ghosts:
+            self.table.offset[ghosts.rows, ghosts.edges] = ghosts.tangent(time)
+
+    def measure(self, state: State, measure) -> None:
+        """Hinge angles, tilts and their measure at a state."""
+        kernels.tilts(state.x, state.scalars, self.stencil, self.theta_ref, self.theta, self.t)
+        measure(self.t, self.s)
+
+    def set_rest(self, state: State, panels: PanelData, measure) -> None:
+        """Adopt a state as stress-free."""
+        cells, verts = self.table.cells, self.stencil.verts
+        self.place_ghosts(state.time)
+        self.measure(state, measure)
+        self.theta_ref[:] = self.theta
+        abar, bbar = np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
+        kernels.metrics(state.x, verts, abar)
+        kernels.second_form(state.x, verts, self.s, bbar)
+        if panels.curvature is not None:
+            bbar += covariant(panels.curvature[cells], state.x, verts)
+        h = panels.thickness[cells]
+        stiffness = kernels.plane_stress_stiffness(
+            abar, young=panels.young[cells], poisson=panels.poisson[cells], thickness=h
+        )
+        self.elastic = kernels.Elastic(stiffness, abar, bbar, h**2 / 3)
+
+
+def covariant(tensor: np.ndarray, x: np.ndarray, verts: np.ndarray) -> np.ndarray:
+    """Components 11, 12, 22 of tensors (n, 3, 3) in the basis (v_j - v_i, v_k - v_i): (n, 3)."""
+    base = x[verts[:, 1:3]] - x[verts[:, :1]]
+    form = np.einsum("nai,nij,nbj->nab", base, tensor, base)
+    return np.stack([form[:, 0, 0], form[:, 0, 1], form[:, 1, 1]], axis=1)
+
+
+class ShellTerm(StencilTerm):
+    """Membrane and bending energy of all panels.
+
+    Args:
+        configuration: numbering of the unknowns.
+        batches: stencil tables with the ghosts of each.
+        panels: elastic data of the cells.
+        rest: stress-free state.
+        measure: "tan" (default form) or "sin" (the paper's) of the tilts.
+    """
+
+    kinds = ("membrane", "bending")
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        batches: list[tuple[ShellBatch, list[Ghosts]]],
+        panels: PanelData,
+        rest: State,
+        measure: str = "tan",
+    ):
+        self._measure = kernels.MEASURES[measure]
+        self.batches = [_Batch(table, ghosts, configuration) for table, ghosts in batches]
+        for batch in self.batches:
+            batch.set_rest(rest, panels, self._measure)
+        self.linearise(None, rest)
+
+    def stencils(self) -> list[np.ndarray]:
+        """Local unknowns of each batch."""
+        return [batch.dofs for batch in self.batches]
+
+    def set_time(self, time: float) -> None:
+        """Place the ghost vertices of the clamps."""
+        for batch in self.batches:
+            batch.place_ghosts(time)
+
+    def energies(self, state: State) -> np.ndarray:
+        """Membrane and bending energy of this rank's triangles."""
+        total = np.zeros(2)
+        for batch in self.batches:
+            batch.measure(state, self._measure)
+            kernels.shell_energy(
+                state.x, batch.stencil.verts, batch.s, batch.elastic, batch.energy
+            )
+            total += batch.energy.sum(axis=0)
+        return total
+
+    def add_residual(self, state: State, out: np.ndarray) -> None:
+        """Add the energy's gradient."""
+        for batch in self.batches:
+            batch.measure(state, self._measure)
+            kernels.shell_gradient(
+                state.x, batch.stencil, batch.s, batch.elastic, batch.energy, batch.g
+            )
+            kernels.add_at(batch.g, batch.scatter, out)
+
+    def linearise(self, previous: State | None, current: State) -> None:
+        """Membrane stress of the next tangent: extrapolated from the iterate before, if any."""
+        for batch in self.batches:
+            verts = batch.stencil.verts
+            if previous is None:
+                kernels.membrane_stress(current.x, verts, batch.elastic, batch.sigma)
+            else:
+                step = current.x - previous.x
+                kernels.extrapolated_stress(
+                    previous.x, step, verts, batch.elastic, batch.sigma
+                )
+
+    def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
+        """Write the Hessians, with the membrane stress that `linearise` fixed."""
+        for batch, block in zip(self.batches, blocks, strict=True):
+            batch.measure(state, self._measure)
+            kernels.shell_hessian(
+                state.x, batch.stencil, batch.s, batch.elastic, batch.sigma,
+                batch.energy, batch.g, block,
+            )  # fmt: skip
+
+    def accept(self, state: State) -> None:
+        """Unwrap hinge angles against this state from now on."""
+        for batch in self.batches:
+            batch.measure(state, self._measure)
+            batch.theta_ref[:] = batch.theta
+
+    def largest_tilt(self, state: State) -> float:
+        """Largest |tilt| (radians) of this rank's triangles."""
+        largest = 0.0
+        for batch in self.batches:
+            batch.measure(state, self._measure)
+            largest = max(largest, float(np.abs(batch.t).max(initial=0.0)))
+        return largest
+
+    def smallest_area_ratio(self, state: State) -> float:
+        """Smallest ratio of current to rest area of this rank's triangles."""
+        smallest = np.inf
+        for batch in self.batches:
+            area, abar = np.zeros(len(batch.t)), batch.elastic.abar
+            kernels.areas(state.x, batch.stencil.verts, area)
+            rest = 0.5 * np.sqrt(abar[:, 0] * abar[:, 2] - abar[:, 1] ** 2)
+            smallest = min(smallest, float((area / rest).min(initial=np.inf)))
+        return smallest
