@@ -129,7 +129,7 @@ class CreasePattern:
         letters = np.where(count == 1, "B", "U").astype(object)
         angles = np.full(len(edges), np.nan)
         for values, given in ((letters, assignment or {}), (angles, fold_angle or {})):
-            values[_find_pairs(list(given), edges)] = list(given.values())
+            values[find_edges(list(given), edges)] = list(given.values())
         points = np.asarray(vertices, dtype=float)
         return cls(points, edges, tuple(letters), loops, angles, tolerance=tolerance)
 
@@ -353,8 +353,8 @@ def _loops(faces: Sequence[Sequence[int]]) -> tuple[tuple[int, ...], ...]:
     )
 
 
-def _find_pairs(pairs: Sequence[Pair], edges: Ints) -> Ints:
-    """Edges of vertex pairs, all of which must exist."""
+def find_edges(pairs: Sequence[Pair], edges: Ints) -> Ints:
+    """Return the index of the edge of each vertex pair; PatternError where there is none."""
     found = pair_index(np.array(pairs, dtype=np.int64).reshape(-1, 2), edges)
     checks.fail_at(found < 0, lambda k: f"no edge joins the vertices {tuple(pairs[k])}")
     return found

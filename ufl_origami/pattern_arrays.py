@@ -76,7 +76,9 @@ def property_array(values: Any) -> npt.NDArray[Any]:
 
 
 def properties(given: Mapping[str, Any]) -> Mapping[str, npt.NDArray[Any]]:
-    """Return all properties as read-only arrays."""
+    """Return all properties as read-only arrays; `name` is no property (it holds names)."""
+    if "name" in given:
+        raise PatternError("a property cannot be called 'name': that key holds the names")
     return MappingProxyType({name: property_array(values) for name, values in given.items()})
 
 

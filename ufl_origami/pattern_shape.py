@@ -33,7 +33,8 @@ def check_duplicates(points: Floats, tolerance: float, allowed: npt.NDArray[np.b
         ~allowed[pairs].all(axis=1),
         lambda k: (
             f"duplicate vertices: {pairs[k, 0]} and {pairs[k, 1]} are both at "
-            f"{points[pairs[k, 0]].tolist()}"
+            f"{points[pairs[k, 0]].tolist()}; vertices may touch at the ends of cuts (C) or in a "
+            f"frame with the attribute selfTouching"
         ),
     )
 
@@ -67,11 +68,22 @@ def _segments_meet(flat: Floats, i: int, j: int, tolerance: float) -> npt.NDArra
     """Whether sides i and j of each polygon (k, n, 2) cross or come within tolerance * size."""
     n = flat.shape[1]
     a, b, c, d = flat[:, i], flat[:, (i + 1) % n], flat[:, j], flat[:, (j + 1) % n]
-    crossing = (_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)
+    crossing = segments_cross(a, b, c, d)
     gap = np.min(
-        [_distance(a, c, d), _distance(b, c, d), _distance(c, a, b), _distance(d, a, b)], axis=0
+        [
+            point_segment_distance(a, c, d),
+            point_segment_distance(b, c, d),
+            point_segment_distance(c, a, b),
+            point_segment_distance(d, a, b),
+        ],
+        axis=0,
     )
     return crossing | (gap <= tolerance * np.ptp(flat, axis=1).max(axis=1))
+
+
+def segments_cross(a: Floats, b: Floats, c: Floats, d: Floats) -> npt.NDArray[np.bool_]:
+    """Whether the inner parts of segments a-b and c-d, (k, 2) or (1, 2) each, cross."""
+    return (_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)
 
 
 def _side(a: Floats, b: Floats, p: Floats) -> Floats:
@@ -80,10 +92,10 @@ def _side(a: Floats, b: Floats, p: Floats) -> Floats:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
-def _distance(p: Floats, a: Floats, b: Floats) -> Floats:
-    """Distance of p from the segment between a and b."""
+def point_segment_distance(p: Floats, a: Floats, b: Floats) -> Floats:
+    """Distance of p from the segment between a and b, (k, 2) or (1, 2) each."""
     u = b - a
-    t = np.einsum("ki,ki->k", p - a, u) / np.maximum(np.einsum("ki,ki->k", u, u), 1e-300)
+    t = ((p - a) * u).sum(axis=1) / np.maximum((u * u).sum(axis=1), 1e-300)
     return np.linalg.norm(p - a - np.clip(t, 0.0, 1.0)[:, None] * u, axis=1)
 
 
