@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Run the tests on one process, then those marked mpi on two: bash test.sh [PYTEST ARGS]
+# -m EXPRESSION selects in both parts; without it the slow tests are left out.
+set -euo pipefail
+
+repo=$(dirname "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")")
+source "$repo/launcher/common.sh"
+limit=${UFL_ORIGAMI_MPI_TIMEOUT:-3600} # seconds, for a hang that the plugin does not see
+
+selection="not slow"
+arguments=()
+parts=2
+while (($#)); do
+    case $1 in
+        -m) selection=${2:?-m needs an expression}; shift ;;
+        -m?*) selection=${1#-m} ;;
+        -h | --help | --version | --co | --collect-only | --markers | --fixtures | --pdb)
+            parts=1; arguments+=("$1") ;;
+        *) arguments+=("$1") ;;
+    esac
+    shift
+done
+
+cd "$repo"
+serial=0
+python3 -m pytest -m "$selection" "${arguments[@]}" || serial=$?
+# From 2 on pytest was interrupted, misused, or found no test: the second part would do the same.
+if ((parts == 1 || serial > 1)); then exit "$serial"; fi
+
+say "the tests marked mpi, on two processes"
+parallel=0
+timeout --foreground -k 10 "$limit" mpirun -n 2 python3 -m pytest -p launcher.pytest_mpi \
+    -p no:cacheprovider -m "mpi and not serial and ($selection)" "${arguments[@]}" || parallel=$?
+if ((parallel == 124)); then say "the tests on two processes took longer than $limit s"; fi
+exit $((serial ? serial : parallel))
