@@ -46,12 +46,14 @@ def write_corners(h, i, sides, v, jac, y):
     n = point(sides.normal, 3)
     for a in range(3):
         for j in range(3):
-            for b in range(3):
+            for b in range(a + 1):
                 for k in range(3):
                     value = n[j] * v[a, b, k] + v[b, a, j] * n[k]
                     for r in range(6):
                         value += jac[r, 3 * a + j] * y[r, 3 * b + k]
                     h[i, 3 * a + j, 3 * b + k] = value
+                    if b < a:
+                        h[i, 3 * b + k, 3 * a + j] = value
 
 
 @inlined
@@ -89,13 +91,16 @@ def add_neighbour_curvature(h, i, e, factor, corner, sides):
     unit, m, inverse = side_frame(corner[q], corner[p], n)
     dofs, z = (3 * q, 3 * p, 9 + 3 * e), (-inverse, inverse, 0.0)
     for a in range(3):
-        for b in range(3):
+        for b in range(a + 1):
             w_a, w_b = sides.other[e, a], sides.other[e, b]
             ab = side_vector(w_a, w_b, z[a], z[b], (unit, m))
             ba = side_vector(w_b, w_a, z[b], z[a], (unit, m))
             for j in range(3):
                 for k in range(3):
-                    h[i, dofs[a] + j, dofs[b] + k] -= factor * (n[j] * ab[k] + ba[j] * n[k])
+                    value = factor * (n[j] * ab[k] + ba[j] * n[k])
+                    h[i, dofs[a] + j, dofs[b] + k] -= value
+                    if b < a:
+                        h[i, dofs[b] + k, dofs[a] + j] -= value
 
 
 @inlined
