@@ -1,6 +1,7 @@
 """Exact references: elastica against its own equation, equilibrium, energy and limits."""
 
 from math import cos, degrees, inf, pi, radians, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from ufl_origami.analytic import (
     ritz_angle,
 )
 from ufl_origami.analytic.elastica import arc_integrals, arc_parameter, arc_profile
+from ufl_origami.analytic.reference_tables import read_table
 from ufl_origami.errors import InputError
 
 pytestmark = pytest.mark.serial
 
+REFERENCE = Path(__file__).parent / "reference"
 UNEQUAL = [
     ZFold((1.0, 2.0), (1.0, 1.0), 1.0),
     ZFold((1.0, 2.0), (1.0, 8.0), 12.0),
@@ -256,3 +259,74 @@ def test_opening_out_of_range_is_refused(opening):
 def test_impossible_folds_are_refused(arguments, named):
     with pytest.raises(InputError, match=named):
         ZFold(*arguments)
+
+
+# --- tables
+
+
+def test_sze_table_of_the_end_shear_is_the_elastica():
+    """To the last digit and 0.1 % (the table's finite elements strain, the elastica does not)."""
+    table = read_table(REFERENCE / "sze2004_cantilever_end_shear.csv")
+    tips = [cantilever_end_shear(4 * p, length=10.0) for p in table["P_over_Pmax"]]
+    for name, values in (("Uz_tip", [t.w for t in tips]), ("minus_Ux_tip", [t.u for t in tips])):
+        assert np.all(np.abs(values - table[name]) < 5e-4 + 1e-3 * table[name])
+
+
+def test_sze_table_of_the_end_moment_is_the_circle():
+    table = read_table(REFERENCE / "sze2004_cantilever_end_moment.csv")
+    tips = [cantilever_end_moment(2 * pi * m, length=12.0) for m in table["M_over_Mmax"]]
+    assert np.max(np.abs([t.w for t in tips] - table["Uz_tip"])) < 6e-4
+    assert np.max(np.abs([t.u for t in tips] - table["minus_Ux_tip"])) < 6e-4
+
+
+@pytest.mark.parametrize(
+    ("problem", "columns", "tolerance"),
+    [
+        ("slit_annular_plate", ("W_inner_A(r=6)", "W_A_inner"), 4e-3),
+        ("slit_annular_plate", ("W_outer_B(r=10)", "W_B_outer"), 4e-3),
+        ("hemisphere_18deg_hole", ("inward_displacement_at_pushed_point", "inward"), 1e-2),
+        ("cylinder_open_end_pullout", ("W_A", "W_A"), 2e-2),
+    ],
+)
+def test_two_references_of_a_problem_agree(problem, columns, tolerance):
+    """Reissner-Mindlin (Sze) and Kirchhoff-Love end values: softer by the shear at most."""
+    sze = read_table(REFERENCE / f"sze2004_{problem}.csv")
+    kl = read_table(REFERENCE / f"kirchhoff_love_{problem}.csv")
+    assert kl.head["problem"] == f"as in sze2004_{problem}.csv"
+    at = np.isin(sze["P_over_Pmax"], kl["P_over_Pmax"])
+    assert np.count_nonzero(at) >= 20
+    thick, thin = sze[columns[0]][-1], kl[columns[1]][-1]
+    assert 0 < thick / thin - 1 < tolerance
+
+
+def test_every_table_names_its_source():
+    files = sorted(REFERENCE.glob("*.csv"))
+    assert len(files) == 8
+    for file in files:
+        table = read_table(file)
+        assert {"source", "problem"} <= set(table.head)
+        load = next(iter(table.columns.values()))
+        assert load[-1] == 1 and np.all(np.diff(load) > 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("# nothing\na,b\n1,2\n", "without a key"),
+        ("a,b\n1\n", "row 1 has 1 cells"),
+        ("a,b\n1,2\n1,x\n", "row 2"),
+        ("a,b\n1,nan\n", "not finite"),
+        ("a,b\n", "no rows"),
+        ("", "no rows"),
+    ],
+)
+def test_bad_tables_are_refused(tmp_path, text, named):
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(InputError, match=named):
+        read_table(tmp_path / "table.csv")
+
+
+def test_unknown_column_is_named():
+    table = read_table(REFERENCE / "sze2004_cantilever_end_moment.csv")
+    with pytest.raises(InputError, match="Uy"):
+        table["Uy"]
