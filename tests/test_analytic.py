@@ -265,11 +265,11 @@ def test_impossible_folds_are_refused(arguments, named):
 
 
 def test_sze_table_of_the_end_shear_is_the_elastica():
-    """To the last digit and 0.1 % (the table's finite elements strain, the elastica does not)."""
+    """Within 0.04 % of the length: the table's shells strain, the elastica does not."""
     table = read_table(REFERENCE / "sze2004_cantilever_end_shear.csv")
     tips = [cantilever_end_shear(4 * p, length=10.0) for p in table["P_over_Pmax"]]
     for name, values in (("Uz_tip", [t.w for t in tips]), ("minus_Ux_tip", [t.u for t in tips])):
-        assert np.all(np.abs(values - table[name]) < 5e-4 + 1e-3 * table[name])
+        assert np.max(np.abs(values - table[name])) < 4e-4 * 10.0
 
 
 def test_sze_table_of_the_end_moment_is_the_circle():
