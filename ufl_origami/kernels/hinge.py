@@ -11,7 +11,7 @@ r, m = n x e (inwards), foot of r at p + lam (q - p), let
     hess_ab theta     = -(n (x) v_ab + v_ba (x) n),     v_ab = (w_a w_b + z_a z_b / 2) m + z_a w_b e
 
 The term in z z is half of its unsymmetric original; the two sides' other halves cancel.
-Equivalent to Tamstorf & Grinspun 2013, doi:10.1016/j.gmod.2013.07.001, section 3, with fewer
+Equivalent to Tamstorf & Grinspun 2013, doi:10.1016/j.gmod.2013.07.001, with fewer
 operations.
 """
 

@@ -40,7 +40,7 @@ def plane_stress_stiffness(
     """Matrix C of the membrane energy h/8 |Abar^-1 (A - Abar)|^2_SV 2 area.
 
     |M|^2_SV = lam/2 tr(M)^2 + mu tr(M^2) with plane stress lam = E nu / (1 - nu^2), mu = E / (2
-    (1 + nu)) (Weischedel 2012, Chen et al. 2018, doi:10.1145/3197517.3201395, section 3).
+    (1 + nu)) (Weischedel 2012; Chen et al. 2018, doi:10.1145/3197517.3201395).
 
     Args:
         abar: (n, 3) rest metrics.
