@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import basix.ufl
 import numpy as np
+import numpy.typing as npt
 from dolfinx import cpp, fem, graph, mesh
 
 from ufl_origami import mesh_checks
@@ -110,7 +111,7 @@ class SheetMesh:
         Raises:
             InputError: when no panel has this name.
         """
-        panel = self.panel_names.index(_known(name, self.panel_names, "panel"))
+        panel = self.panel_names.index(known_name(name, self.panel_names, "panel"))
         return np.flatnonzero(self.cell_panel == panel).astype(np.int32)
 
     def edge_facets(self, name: str) -> np.ndarray:
@@ -119,7 +120,7 @@ class SheetMesh:
         Raises:
             InputError: when no edge set has this name.
         """
-        return self.edges[_known(name, self.edges, "edge set")]
+        return self.edges[known_name(name, self.edges, "edge set")]
 
     def point_vertex(self, name: str) -> int:
         """Return the local vertex of a named point, -1 where this rank does not have it.
@@ -127,7 +128,7 @@ class SheetMesh:
         Raises:
             InputError: when no point has this name.
         """
-        return self.points[_known(name, self.points, "point")]
+        return self.points[known_name(name, self.points, "point")]
 
     @property
     def _num_local_edges(self) -> int:
@@ -173,7 +174,7 @@ def sheet_from_arrays(
     *,
     panel: np.ndarray | None = None,
     panel_names: Iterable[str] | None = None,
-    edges: Mapping[str, np.ndarray] | None = None,
+    edges: Mapping[str, npt.ArrayLike] | None = None,
     creases: Iterable[str] = (),
     points: Mapping[str, int] | None = None,
     partitioner: GraphPartitioner | None = None,
@@ -215,7 +216,7 @@ class _Names:
 
     panel: np.ndarray | None
     panel_names: Iterable[str] | None
-    edges: Mapping[str, np.ndarray]
+    edges: Mapping[str, npt.ArrayLike]
     creases: Iterable[str]
     points: Mapping[str, int]
 
@@ -313,10 +314,16 @@ def _local_points(tags: _Tags, input_vertex: np.ndarray) -> dict[str, int]:
     return {name: local.get(vertex, -1) for name, vertex in tags.points.items()}
 
 
-def _known(name: str, names: Iterable[str], kind: str) -> str:
-    """Return the name; an unknown one raises InputError with close names."""
+def known_name(
+    name: str, names: Iterable[str], kind: str, error: type[InputError] = InputError
+) -> str:
+    """Return the name.
+
+    Raises:
+        InputError: (or the class given) when it is none of the names, with close ones.
+    """
     names = list(names)
     if name in names:
         return name
     close = difflib.get_close_matches(name, names) or sorted(names)
-    raise InputError(f"no {kind} is named {name!r}; did you mean {', '.join(map(repr, close))}?")
+    raise error(f"no {kind} is named {name!r}; did you mean {', '.join(map(repr, close))}?")
