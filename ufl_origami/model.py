@@ -70,7 +70,8 @@ class Model:
         """Current position (3,) of a named point."""
         vertex = self.sheet.point_vertex(point)
         mine = 0 <= vertex < self.configuration.nv_owned
-        return self.configuration.sum(self.state.x[vertex] if mine else np.zeros(3))
+        positions = self.state.x
+        return self.configuration.sum(positions[vertex] if mine else np.zeros(3))
 
     def fold_angles(self, name: str) -> "FoldAngles":
         """Virtual and mesh fold angles along this rank's share of a crease."""
