@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ufl_origami.errors import PatternError
-from ufl_origami.pattern_arrays import coordinates, integers
+from ufl_origami.pattern_arrays import coordinates, integers, loops
 from ufl_origami.pattern_checks import check_coordinates, check_edges, fail_at
 from ufl_origami.pattern_shape import point_segment_distance, segments_cross
 from ufl_origami.pattern_topology import Corners, Floats, Ints, edges_of, join_faces
@@ -59,7 +59,7 @@ def _edges(frame: Mapping[str, Any], faces: list[Any] | None) -> Ints:
             f"edges_vertices is missing, so that nothing tells which edges {numbered[0]} is about"
         )
     if faces is not None:
-        return edges_of(Corners.from_loops(integer_loops(faces)))
+        return edges_of(Corners.from_loops(loops(faces)))
     if "vertices_vertices" in frame:
         neighbours = entries(frame, "vertices_vertices")
         pairs = [sorted((v, w)) for v, near in enumerate(neighbours) for w in near]
@@ -69,18 +69,13 @@ def _edges(frame: Mapping[str, Any], faces: list[Any] | None) -> Ints:
     )
 
 
-def integer_loops(faces: Sequence[Any]) -> Loops:
-    """Loops as lists of whole numbers."""
-    return [list(map(int, integers(loop, (-1,), f"face {f}"))) for f, loop in enumerate(faces)]
-
-
 def _edges_from_faces(faces: list[Any], faces_edges: list[Any]) -> Ints:
     """Edges numbered as `faces_edges` says: its entry [f][i] joins vertices i, i + 1 of face f."""
-    loops = integer_loops(faces)
-    if [len(loop) for loop in loops] != [len(numbers) for numbers in faces_edges]:
+    vertices = loops(faces)
+    if [len(loop) for loop in vertices] != [len(numbers) for numbers in faces_edges]:
         raise PatternError("faces_edges and faces_vertices have loops of different lengths")
-    corners = Corners.from_loops(loops)
-    number = np.array([e for numbers in integer_loops(faces_edges) for e in numbers], dtype=int)
+    corners = Corners.from_loops(vertices)
+    number = np.array([e for numbers in loops(faces_edges) for e in numbers], dtype=int)
     found, first = np.unique(number, return_index=True)
     fail_at(found != np.arange(len(found)), lambda k: f"faces_edges names no edge {k}")
     edges = corners.pairs[first]
@@ -97,10 +92,10 @@ def _edges_from_faces(faces: list[Any], faces_edges: list[Any]) -> Ints:
 
 def _loops_from_edges(faces_edges: list[Any], edges: Ints) -> Loops:
     """Loops of vertices from loops of edges."""
-    loops = []
-    for f, numbers in enumerate(integer_loops(faces_edges)):
+    found = []
+    for f, numbers in enumerate(loops(faces_edges)):
         if not all(0 <= e < len(edges) for e in numbers):
-            raise PatternError(f"faces_edges[{f}] is {numbers}: edges go to {len(edges) - 1}")
+            raise PatternError(f"faces_edges[{f}] is {list(numbers)}: edges go to {len(edges) - 1}")
         before = np.roll(numbers, 1)
         shared = [set(edges[a]) & set(edges[b]) for a, b in zip(before, numbers, strict=True)]
         bad = [k for k, common in enumerate(shared) if len(common) != 1]
@@ -109,8 +104,8 @@ def _loops_from_edges(faces_edges: list[Any], edges: Ints) -> Loops:
                 f"face {f} is not closed: its edges {before[bad[0]]} and {numbers[bad[0]]} do not "
                 f"meet in one vertex"
             )
-        loops.append([int(common.pop()) for common in shared])
-    return loops
+        found.append([int(common.pop()) for common in shared])
+    return found
 
 
 def plane_faces(points: Floats, edges: Ints) -> Loops:
@@ -132,19 +127,26 @@ def plane_faces(points: Floats, edges: Ints) -> Loops:
 
 
 def _check_crossings(points: Floats, edges: Ints, missing: str) -> None:
-    """No two edges may cross, and no vertex may lie inside an edge."""
-    start, end = points[edges[:, 0]], points[edges[:, 1]]
-    size = np.ptp(points, axis=0).max()
-    for e in range(len(edges)):
-        u, v = edges[e]
-        cross = segments_cross(points[[u]], points[[v]], start[e + 1 :], end[e + 1 :])
+    """No two edges may cross, and no vertex may lie inside an edge; a sweep along x."""
+    left, right = np.sort(points[edges, 0], axis=1).T
+    order, by_x = np.argsort(left), np.argsort(points[:, 0])
+    start, end = points[edges[order, 0]], points[edges[order, 1]]
+    slack = 1e-9 * np.ptp(points, axis=0).max()
+    last_edge = np.searchsorted(left[order], right[order], side="right")
+    first_vertex = np.searchsorted(points[by_x, 0], left[order] - slack)
+    last_vertex = np.searchsorted(points[by_x, 0], right[order] + slack)
+    for k, e in enumerate(order):
+        a, b = start[[k]], end[[k]]
+        others = slice(k + 1, last_edge[k])
+        cross = segments_cross(a, b, start[others], end[others])
         if cross.any():
-            other = e + 1 + int(np.argmax(cross))
-            raise PatternError(f"{missing}: edges {e} and {other} cross without a vertex")
-        near = point_segment_distance(points, points[[u]], points[[v]]) <= 1e-9 * size
-        near[[u, v]] = False
-        if near.any():
-            raise PatternError(f"{missing}: vertex {np.argmax(near)} lies on edge {e}")
+            pair = sorted((int(e), int(order[others][np.argmax(cross)])))
+            raise PatternError(f"{missing}: edges {pair[0]} and {pair[1]} cross without a vertex")
+        near = by_x[first_vertex[k] : last_vertex[k]]
+        near = near[point_segment_distance(points[near], a, b) <= slack]
+        inside = near[(near != edges[e, 0]) & (near != edges[e, 1])]
+        if len(inside):
+            raise PatternError(f"{missing}: vertex {inside[0]} lies on edge {e}")
 
 
 def _trace(points: Floats, edges: Ints) -> Loops:
@@ -160,7 +162,7 @@ def _trace(points: Floats, edges: Ints) -> Loops:
     twin = np.roll(np.arange(len(tail)), len(edges))
     place = (rank[twin] - start[head] - 1) % degree[head]
     following = order[start[head] + place]
-    loops, seen = [], np.zeros(len(tail), dtype=bool)
+    found, seen = [], np.zeros(len(tail), dtype=bool)
     for first in range(len(tail)):
         loop, half = [], first
         while not seen[half]:
@@ -168,8 +170,8 @@ def _trace(points: Floats, edges: Ints) -> Loops:
             loop.append(int(tail[half]))
             half = following[half]
         if loop:
-            loops.append(loop)
-    return loops
+            found.append(loop)
+    return found
 
 
 def _area(loop: Floats) -> float:

@@ -24,7 +24,7 @@ import numpy as np
 
 from ufl_origami import pattern_arrays as arrays
 from ufl_origami.errors import PatternError
-from ufl_origami.fold_infer import complete, entries, integer_loops
+from ufl_origami.fold_infer import complete, entries
 from ufl_origami.pattern import CreasePattern
 from ufl_origami.pattern_names import PatternNames
 from ufl_origami.pattern_topology import Corners, Floats, Ints, pair_index
@@ -133,7 +133,7 @@ def _assignment(source: Mapping[str, Any], edges: Ints, faces: Any) -> tuple[str
     """Assignments of the file, or B where an edge has one face and U elsewhere."""
     if "edges_assignment" in source:
         return tuple(entries(source, "edges_assignment"))
-    edge = pair_index(Corners.from_loops(integer_loops(faces)).pairs, edges)
+    edge = pair_index(Corners.from_loops(arrays.loops(faces)).pairs, edges)
     count = np.bincount(edge[edge >= 0], minlength=len(edges))
     return tuple("B" if number == 1 else "U" for number in count)
 
@@ -142,13 +142,18 @@ def _check_edges_faces(source: Mapping[str, Any], edges: Ints, faces: Any) -> No
     """`edges_faces`, where given, must name the faces whose loops run through the edge."""
     if "edges_faces" not in source:
         return
-    corners = Corners.from_loops(integer_loops(faces))
+    corners = Corners.from_loops(arrays.loops(faces))
     real: list[set[int]] = [set() for _ in edges]
     for edge, face in zip(pair_index(corners.pairs, edges), corners.face, strict=True):
         if edge >= 0:
             real[edge].add(int(face))
-    for e, given in enumerate(entries(source, "edges_faces")):
-        if e >= len(edges) or {face for face in given if face is not None} != real[e]:
+    listed = entries(source, "edges_faces")
+    if len(listed) != len(edges):
+        raise PatternError(
+            f"edges_faces has {len(listed)} values, but there are {len(edges)} edges"
+        )
+    for e, given in enumerate(listed):
+        if {face for face in given if face is not None} != real[e]:
             raise PatternError(
                 f"edges_faces gives faces {given} to edge {e}, but the faces with this side are "
                 f"{sorted(real[e])}"

@@ -16,7 +16,7 @@ valleys are positive.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -40,7 +40,6 @@ from ufl_origami.pattern_topology import (
     edge_angles,
     edges_of,
     join_faces,
-    pair_index,
 )
 
 Pair = tuple[int, int]
@@ -82,7 +81,7 @@ class CreasePattern:
         """Turn the input into read-only arrays of the documented shapes, then check it."""
         points = arrays.coordinates(self.vertices_coords)
         edges = arrays.integers(self.edges_vertices, (-1, 2), "edges_vertices")
-        faces = _loops(self.faces_vertices)
+        faces = arrays.loops(self.faces_vertices)
         values = {
             "vertices_coords": points,
             "edges_vertices": edges,
@@ -116,20 +115,20 @@ class CreasePattern:
             vertices: (n, 2) or (n, 3) rest coordinates.
             faces: loops of vertices.
             assignment: letter by vertex pair; other edges are B with one face, U with more.
-            fold_angle: fold angle in degrees by vertex pair; unknown elsewhere.
+            fold_angle: fold angle in degrees by vertex pair; elsewhere unknown, 0 with one face.
             tolerance: see the class.
 
         Raises:
             PatternError: also when a vertex pair is no side of a face.
         """
-        loops = _loops(faces)
+        loops = arrays.loops(faces)
         corners = Corners.from_loops(loops)
         edges = edges_of(corners)
         count = Incidence.build(corners, edges).num_faces
         letters = np.where(count == 1, "B", "U").astype(object)
-        angles = np.full(len(edges), np.nan)
+        angles = np.where((count == 1) & bool(fold_angle), 0.0, np.nan)
         for values, given in ((letters, assignment or {}), (angles, fold_angle or {})):
-            values[find_edges(list(given), edges)] = list(given.values())
+            values[checks.find_edges(list(given), edges)] = list(given.values())
         points = np.asarray(vertices, dtype=float)
         return cls(points, edges, tuple(letters), loops, angles, tolerance=tolerance)
 
@@ -339,22 +338,13 @@ class CreasePattern:
 
     # ---- text
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = [getattr(self, entry.name) for entry in fields(self)]
+        return type(self), tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in values)
+
     def __repr__(self) -> str:
         return f"<{pattern_text.title(self)}>"
 
     def summary(self) -> str:
         """Describe panels, creases (length, geometric fold angle), boundaries and points."""
         return pattern_text.summary(self)
-
-
-def _loops(faces: Sequence[Sequence[int]]) -> tuple[tuple[int, ...], ...]:
-    return tuple(
-        tuple(map(int, arrays.integers(loop, (-1,), f"face {f}"))) for f, loop in enumerate(faces)
-    )
-
-
-def find_edges(pairs: Sequence[Pair], edges: Ints) -> Ints:
-    """Return the index of the edge of each vertex pair; PatternError where there is none."""
-    found = pair_index(np.array(pairs, dtype=np.int64).reshape(-1, 2), edges)
-    checks.fail_at(found < 0, lambda k: f"no edge joins the vertices {tuple(pairs[k])}")
-    return found

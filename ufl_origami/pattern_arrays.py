@@ -1,6 +1,6 @@
 """Input of a crease pattern as read-only numpy arrays, with errors that name the entry."""
 
-from collections.abc import Mapping, Sized
+from collections.abc import Mapping, Sequence, Sized
 from types import MappingProxyType
 from typing import Any
 
@@ -36,6 +36,13 @@ def integers(values: Any, shape: tuple[int, ...], what: str) -> Ints:
             f"{what} must be whole numbers of shape ({wanted}), not {array.dtype} {array.shape}"
         )
     return read_only(array.astype(np.int64))
+
+
+def loops(faces: Sequence[Any]) -> tuple[tuple[int, ...], ...]:
+    """Return loops of vertices (or edges) as tuples of whole numbers."""
+    return tuple(
+        tuple(map(int, integers(loop, (-1,), f"face {f}"))) for f, loop in enumerate(faces)
+    )
 
 
 def coordinates(rows: Any) -> Floats:

@@ -46,6 +46,13 @@ def edge_label(edge: int, edges: Ints, assignment: Sequence[str] | None = None) 
     return f"edge {edge} (vertices {edges[edge, 0]}-{edges[edge, 1]}{kind})"
 
 
+def find_edges(pairs: Sequence[tuple[int, int]], edges: Ints) -> Ints:
+    """Return the index of the edge of each vertex pair; PatternError where there is none."""
+    found = pair_index(np.array(pairs, dtype=np.int64).reshape(-1, 2), edges)
+    fail_at(found < 0, lambda k: f"no edge joins the vertices {tuple(pairs[k])}")
+    return found
+
+
 def check_coordinates(points: Floats) -> None:
     """Coordinates must be finite."""
     fail_at(

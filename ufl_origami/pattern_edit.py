@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from ufl_origami import pattern_names
 from ufl_origami.errors import PatternError
-from ufl_origami.pattern import CreasePattern, find_edges
+from ufl_origami.pattern import CreasePattern
 from ufl_origami.pattern_arrays import property_array
+from ufl_origami.pattern_checks import find_edges
 from ufl_origami.pattern_names import PatternNames
 from ufl_origami.pattern_topology import Ints
 
@@ -41,7 +42,7 @@ def with_fold_angles(pattern: CreasePattern, angles: Mapping[str, float | None])
     Raises:
         PatternError: unknown crease, or an angle that contradicts assignment or folded geometry.
     """
-    values = np.array(pattern.edges_foldAngle)
+    values = np.where(pattern.is_boundary, 0.0, pattern.edges_foldAngle)
     for name, angle in angles.items():
         if name not in pattern.creases:
             pattern_names.unknown("crease", name, list(pattern.creases))

@@ -34,12 +34,14 @@ class PatternNames:
 
 
 def _filled(names: Sequence[str | None], number: int, what: str) -> NameList:
-    if len(names) not in (0, number):
+    if all(name is None for name in names):
+        return (None,) * number
+    if len(names) != number:
         raise PatternError(f"{len(names)} names are given for {number} {what}")
     for k, name in enumerate(names):
         if name is not None and (not isinstance(name, str) or not name.strip()):
             raise PatternError(f"entry {k} of the names of {what} is {name!r}: not a name")
-    return tuple(names) or (None,) * number
+    return tuple(names)
 
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> NoReturn:

@@ -1,6 +1,6 @@
 """Which faces meet at which edge, face normals and fold angles, for polygons given by loops.
 
-Numpy arrays only. A *corner* is one entry of one face loop; corner c of face f stands for its
+Plain arrays only. A *corner* is one entry of one face loop; corner c of face f stands for its
 vertex and for the edge from that vertex to the next one of the loop. All loops are stored one
 after the other, so that nothing here loops over faces.
 """
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -142,16 +144,11 @@ def join_faces(num_faces: int, links: Ints) -> Ints:
 
     Groups are numbered by their lowest face.
     """
-    lowest = np.arange(num_faces)
-    while True:
-        least = np.minimum(lowest[links[:, 0]], lowest[links[:, 1]])
-        new = lowest.copy()
-        np.minimum.at(new, links[:, 0], least)
-        np.minimum.at(new, links[:, 1], least)
-        new = new[new]
-        if np.array_equal(new, lowest):
-            return np.unique(lowest, return_inverse=True)[1].astype(np.int64)
-        lowest = new
+    links = np.asarray(links, dtype=np.int64).reshape(-1, 2)
+    graph = coo_array((np.ones(len(links)), links.T), shape=(num_faces, num_faces))
+    label = connected_components(graph, directed=False)[1]
+    _, first, group = np.unique(label, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[group]
 
 
 def edges_of(corners: Corners) -> Ints:

@@ -55,7 +55,7 @@ def z_fold(
         np.array([pair for pairs in edges.values() for pair in pairs]),
         ("V", *"BBBBBB"),
         ((0, 1, 4, 3), (1, 2, 5, 4)),
-        np.array([180.0 - included_angle, *6 * [math.nan]]),
+        np.array([180.0 - included_angle, *6 * [0.0]]),
         PatternNames(
             vertices=(None, "A", None, None, "B", None),
             edges=tuple(name for name, pairs in edges.items() for _ in pairs),
