@@ -1,6 +1,7 @@
 """FOLD files: exact round trips, what may be left out, and errors that name the file."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,13 @@ def test_scaling_drops_what_no_longer_holds():
     assert data["vertices_coords"][5] == [4.0, 2.0]  # still plane
     assert "file_frames" not in data and "edges_length" not in data
     assert data["editor:settings"] == FLAT["editor:settings"]
+
+
+def test_a_plane_pattern_bent_up_is_written_with_its_heights():
+    plane = pattern_from_fold(flat(frame_classes=..., edges_foldAngle=...))
+    bent = replace(plane, vertices_coords=FLAT["file_frames"][0]["vertices_coords"])
+    assert pattern_to_fold(bent)["vertices_coords"][2] == [1.0, 0.0, 1.0]
+    assert same(pattern_from_fold(pattern_to_fold(bent)), bent)
 
 
 def test_patterns_share_nothing_with_the_dictionary_they_came_from():
