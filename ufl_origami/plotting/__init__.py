@@ -1,0 +1,25 @@
+"""Charts (matplotlib) and pictures of sheets (pyvista): plain arrays in, files out."""
+
+from ufl_origami.plotting.charts import (
+    Series,
+    convergence_chart,
+    fold_angle_chart,
+    history_chart,
+    profile_chart,
+)
+from ufl_origami.plotting.display import DisplayError, virtual_display
+from ufl_origami.plotting.stills import Look, Sheet, film, still
+
+__all__ = [
+    "DisplayError",
+    "Look",
+    "Series",
+    "Sheet",
+    "convergence_chart",
+    "film",
+    "fold_angle_chart",
+    "history_chart",
+    "profile_chart",
+    "still",
+    "virtual_display",
+]
