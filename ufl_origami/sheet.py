@@ -310,7 +310,8 @@ def _local_edges(tags: _Tags, corners: np.ndarray, cell_edges: np.ndarray) -> di
 
 
 def _local_points(tags: _Tags, input_vertex: np.ndarray) -> dict[str, int]:
-    local = {int(g): i for i, g in enumerate(input_vertex) if g in set(tags.points.values())}
+    here = np.flatnonzero(np.isin(input_vertex, list(tags.points.values())))
+    local = {int(input_vertex[i]): int(i) for i in here}
     return {name: local.get(vertex, -1) for name, vertex in tags.points.items()}
 
 
