@@ -35,7 +35,7 @@ make_devices() {
 
 bootstrap() {
     local mirror
-    while read -r mirror; do
+    for mirror in "${mirrors[@]}"; do
         stage "base system from ${mirror:-the default mirror of debootstrap}"
         # With container=lxc debootstrap does not insist on mknod.
         if container=lxc DEBOOTSTRAP_DIR=$debootstrap_dir "$debootstrap" --variant=minbase \
@@ -43,7 +43,7 @@ bootstrap() {
             return
         fi
         tail -n 5 "$root/debootstrap/debootstrap.log" 2>/dev/null || true
-    done < <(debian_mirrors)
+    done
     return 1
 }
 
@@ -99,6 +99,7 @@ umask 022
 require_space
 mkdir "$root" "$tools"
 find_debootstrap
+find_mirrors
 make_devices
 bootstrap
 configure_apt

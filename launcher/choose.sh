@@ -84,7 +84,9 @@ run_in_environment() {
     case ${UFL_ORIGAMI_ENV:-auto} in
         auto)
             # A command started from inside the environment stays there.
-            if [[ ${UFL_ORIGAMI_INSIDE:-} == "$name" ]]; then run_native "$@"; fi
+            case ${UFL_ORIGAMI_INSIDE:-} in
+                "$name" | native) run_native "$@" ;;
+            esac
             run_automatic "$@" ;;
         root)
             can_unshare || no_namespaces

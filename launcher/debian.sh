@@ -19,25 +19,27 @@ find_debootstrap() {
     fi
 }
 
-apt_get() {
-    apt-get -q -o APT::Sandbox::User=root -o Acquire::Retries=3 "$@"
+apt_options=(-q -o APT::Sandbox::User=root -o Acquire::Retries=3)
+apt_get() { apt-get "${apt_options[@]}" "$@"; }
+
+# The package lists of the host may be absent or old, and are not touched: fetch others to $tools.
+fetch_lists() {
+    mkdir -p "$tools/lists/partial" "$tools/cache/archives/partial"
+    apt_options+=(-o "Dir::State::Lists=$tools/lists" -o "Dir::Cache=$tools/cache")
+    apt_get update
 }
 
-# The package lists of the host may be absent and are not touched: they are fetched to $tools.
 fetch_debootstrap() {
-    local own=(-o "Dir::State::Lists=$tools/lists" -o "Dir::Cache=$tools/cache") deb
+    local deb
     command -v apt-get >/dev/null || return 0
     stage "debootstrap"
-    mkdir -p "$tools/lists/partial" "$tools/cache/archives/partial"
-    (
-        cd "$tools"
-        apt_get download debootstrap debian-archive-keyring ||
-            { apt_get "${own[@]}" update &&
-                apt_get "${own[@]}" download debootstrap debian-archive-keyring; }
-    )
-    for deb in "$tools"/*.deb; do
+    cd "$tools"
+    apt_get download debootstrap debian-archive-keyring ||
+        { fetch_lists && apt_get download debootstrap debian-archive-keyring; }
+    for deb in ./*.deb; do
         dpkg-deb -x "$deb" "$tools"
     done
+    cd /
 }
 
 # debootstrap calls wget, which a small system lacks; apt downloads with the proxy that it knows.
@@ -57,21 +59,23 @@ WGET
     export PATH=$tools/bin:$PATH
 }
 
-# One mirror a line, an empty line for debootstrap's default: the user's, or else those from which
-# apt takes the main part of this Debian's own release, then the default.
-debian_mirrors() {
+# The mirrors from which apt takes the main part of Debian release $1.
+apt_mirrors() {
+    # shellcheck disable=SC2016
+    apt_get indextargets --format '$(RELEASE) $(COMPONENT) $(REPO_URI)' 'Identifier: Packages' |
+        awk -v release="$1" '$1 == release && $2 == "main" && $3 ~ /^https?:/ { print $3 }'
+}
+
+# Set mirrors to what is tried in turn: the user's; or else apt's, if this host is a Debian, and
+# debootstrap's default, which is the empty word.
+find_mirrors() {
     local release
-    if [[ -n ${UFL_ORIGAMI_MIRROR:-} ]]; then
-        echo "$UFL_ORIGAMI_MIRROR"
-        return
-    fi
+    mapfile -t mirrors <<<"${UFL_ORIGAMI_MIRROR:-}"
     release=$(. /etc/os-release && [[ ${ID:-} == debian ]] && echo "${VERSION_CODENAME:-}") || true
-    if [[ -n $release ]]; then
-        # shellcheck disable=SC2016
-        apt-get indextargets --format '$(RELEASE) $(COMPONENT) $(REPO_URI)' 'Identifier: Packages' |
-            awk -v release="$release" '$1 == release && $2 == "main" && $3 ~ /^https?:/ { print $3 }'
+    if [[ -z ${UFL_ORIGAMI_MIRROR:-} && -n $release ]]; then
+        if [[ -z $(apt_mirrors "$release") ]]; then fetch_lists || true; fi
+        mapfile -t mirrors < <(apt_mirrors "$release" && echo)
     fi
-    echo
 }
 
 # The proxies of the host's apt, in apt's own syntax; http_proxy and the like pass by themselves.

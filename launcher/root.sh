@@ -43,7 +43,7 @@ in_namespace || status=$?
 if ((status == 0)); then
     say "the environment is ready after $SECONDS s"
 elif ((status > 128)); then
-    say "the build was interrupted; nothing half-made is kept. Run the same command again."
+    say "the build was interrupted; nothing half-made will be used. Run the same command again."
 else
     explain
     status=1
