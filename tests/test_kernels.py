@@ -29,7 +29,7 @@ def elastic_of(x_rest, verts, bbar=None):
         abar, young=YOUNG, poisson=POISSON, thickness=THICKNESS
     )
     bbar = np.zeros((n, 3)) if bbar is None else bbar
-    return Elastic(stiffness, abar, bbar, np.full(n, THICKNESS**2 / 3))
+    return Elastic(stiffness, abar, bbar, THICKNESS**2 / 3 * stiffness)
 
 
 class Shell:

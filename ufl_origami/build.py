@@ -32,7 +32,9 @@ from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.crease import CreaseTerm, LinearLaw
 from ufl_origami.terms.form import SheetFunctions
-from ufl_origami.terms.shell import Ghosts, PanelData, ShellTerm
+from ufl_origami.terms.membrane import MembraneForm
+from ufl_origami.terms.panels import PanelData
+from ufl_origami.terms.shell import Ghosts, ShellTerm
 
 
 def build(scene: Scene) -> Model:
@@ -53,7 +55,10 @@ def build(scene: Scene) -> Model:
     tables = shell_batches(sheet, configuration, clamped)
     shell = shell_term(scene, configuration, tables, rest)
     creases, springs = crease_terms(scene, configuration, fans, rest_angles)
-    terms = [shell, *springs, *load_terms(scene, configuration, sides)]
+    functions = SheetFunctions.create(sheet)
+    terms = [shell, *springs, *load_terms(scene, configuration, sides, functions)]
+    if scene.membrane == "ufl":
+        terms.append(MembraneForm(functions, panel_data(scene)))
     constraints = make_constraints(scene, configuration)
     stiff_folds(scene, creases, configuration, constraints)
     problem = Problem(configuration, terms, constraints)
@@ -100,7 +105,8 @@ def panel_data(scene: Scene) -> PanelData:
     if scene.curvatures:
         tensors = [scene.curvatures.get(n, np.zeros((3, 3))) for n in sheet.panel_names]
         curvature = np.array(tensors)[sheet.cell_panel]
-    return PanelData(values[:, 0], values[:, 1], values[:, 2], curvature)
+    young, poisson, thickness = np.ascontiguousarray(values.T)
+    return PanelData(young, poisson, thickness, curvature, scene.membrane == "kernel")
 
 
 def outward_tangents(sheet: SheetMesh, sides: np.ndarray) -> np.ndarray:
@@ -219,11 +225,10 @@ def stiff_folds(scene: Scene, creases, configuration: Configuration, constraints
             )
 
 
-def load_terms(scene: Scene, configuration: Configuration, sides: EdgeSides) -> list[Term]:
+def load_terms(
+    scene: Scene, configuration: Configuration, sides: EdgeSides, functions: SheetFunctions
+) -> list[Term]:
     """One term a load."""
-    if not scene.loads:
-        return []
-    functions = SheetFunctions.create(scene.sheet)
     makers = {
         "point": point_load,
         "line": line_load,

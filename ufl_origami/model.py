@@ -1,4 +1,4 @@
-"""The discrete DDG model of a scene: unknowns, terms, constraints, and what can be measured on it."""
+"""The discrete DDG model of a scene: unknowns, terms, constraints, and what it can measure."""
 
 from dataclasses import dataclass
 

@@ -116,9 +116,7 @@ def edge_unknowns(sheet: SheetMesh, bending: str, clamped: np.ndarray) -> dict[s
     count = cells_per_edge(sheet)
     creases = crease_facets(sheet)
     largest = sheet.comm.allreduce(int(count[creases].max(initial=0)), op=MPI.MAX)
-    unknowns = {
-        fold_angle_name(pair): creases[count[creases] > pair] for pair in range(1, largest)
-    }
+    unknowns = {fold_angle_name(pair): creases[count[creases] > pair] for pair in range(1, largest)}
     if bending == "director":
         free = np.ones(len(count), dtype=bool)
         free[clamped] = False
@@ -190,7 +188,5 @@ def shell_batches(sheet: SheetMesh, configuration: Configuration, clamped) -> li
         if len(cells):
             pick = np.ix_(cells, range(3), used)
             offset = np.zeros((len(cells), 3, 3))
-            batches.append(
-                ShellBatch(cells, verts[cells], offset, c[cells], d[pick], slot[pick])
-            )
+            batches.append(ShellBatch(cells, verts[cells], offset, c[cells], d[pick], slot[pick]))
     return batches

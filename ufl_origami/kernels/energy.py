@@ -6,10 +6,13 @@ second fundamental form is
 
     B = p_0 [[1, 1], [1, 1]] + p_1 [[1, 0], [0, 0]] + p_2 [[0, 0], [0, 1]]
 
-in the basis (x_j - x_i, x_k - x_i), and the energy W = 1/2 (a - abar)^T C (a - abar) + h^2/3 1/2
-(b - bbar)^T C (b - bbar) with a = (A11, A12, A22), b = (B11, B12, B22) (mid-edge operator:
-Grinspun, Gingold, Reisman & Zorin 2006, doi:10.1111/j.1467-8659.2006.00974.x; energy: Chen et al.
-2018, doi:10.1145/3197517.3201395; the tilt form is ours).
+in the basis (x_j - x_i, x_k - x_i), and the energy
+
+    W = 1/2 (a - abar)^T C (a - abar) + 1/2 (b - bbar)^T (h^2/3 C) (b - bbar)
+
+with a = (A11, A12, A22), b = (B11, B12, B22) (mid-edge operator: Grinspun, Gingold, Reisman &
+Zorin 2006, doi:10.1111/j.1467-8659.2006.00974.x; energy: Chen et al. 2018,
+doi:10.1145/3197517.3201395; the tilt form is ours).
 
     d ln eta_e / d L_f = rate_ef = D_f / (2 D) - delta_ef / (2 L_e),    D_f = (sum_g L_g) / 2 - L_f
 """
@@ -55,10 +58,8 @@ def bending(i, s, lengths, square, elastic):
     """Bending energy, its derivative f_e with respect to p_e, p_e and the altitudes."""
     b, p, eta = form(s, lengths, square)
     change = sub(b, point(elastic.bbar, i))
-    m = stress(elastic.C, i, change)
-    ratio = elastic.h2_3[i]
-    f = (ratio * (m[0] + m[1] + m[2]), ratio * m[0], ratio * m[2])
-    return 0.5 * ratio * dot(m, change), f, p, eta
+    m = stress(elastic.D, i, change)
+    return 0.5 * dot(m, change), (m[0] + m[1] + m[2], m[0], m[2]), p, eta
 
 
 @inlined
@@ -91,7 +92,7 @@ def bending_forces(f, p, rate):
 
 @inlined
 def stiffness_of_form(c, i, q):
-    """Fill q[e, g] with the second derivatives of 1/2 b^T C[i] b with respect to the p_e."""
+    """Fill q[e, g] with the second derivatives of 1/2 b^T c[i] b with respect to the p_e."""
     q[1, 1] = c[i, 0, 0]
     q[2, 2] = c[i, 2, 2]
     q[1, 2] = q[2, 1] = c[i, 0, 2]
@@ -102,7 +103,7 @@ def stiffness_of_form(c, i, q):
 
 @inlined
 def stiffness_of_lengths(c, i, k):
-    """Fill k[e, g], e, g < 3: second derivatives of 1/2 a^T C[i] a by squared lengths."""
+    """Fill k[e, g], e, g < 3: second derivatives of 1/2 a^T c[i] a by squared lengths."""
     quarter = 0.25 * c[i, 1, 1]
     k[0, 0] = quarter
     k[0, 1] = k[1, 0] = -quarter - 0.5 * c[i, 1, 2]
@@ -126,8 +127,7 @@ def scalar_hessian(i, s, state, elastic, work, k):
     """
     lengths, square, d, f, p, eta = state
     rate, q = work
-    ratio = elastic.h2_3[i]
-    stiffness_of_form(elastic.C, i, q)
+    stiffness_of_form(elastic.D, i, q)
     stiffness_of_lengths(elastic.C, i, k)
     half = 0.5 * (f[0] * p[0] + f[1] * p[1] + f[2] * p[2]) / square
     for g in range(3):
@@ -137,7 +137,7 @@ def scalar_hessian(i, s, state, elastic, work, k):
                 row = 0.0
                 for b in range(3):
                     row += q[a, b] * p[b] * rate[b, g]
-                value += p[a] * rate[a, e] * (ratio * row + f[a] * rate[a, g])
+                value += p[a] * rate[a, e] * (row + f[a] * rate[a, g])
             k[e, g] += value
         k[g, g] += 0.5 * f[g] * p[g] / (lengths[g] * lengths[g]) - half
     k[1, 0], k[2, 0], k[2, 1] = k[0, 1], k[0, 2], k[1, 2]
@@ -146,7 +146,7 @@ def scalar_hessian(i, s, state, elastic, work, k):
         for g in range(3):
             row = f[e] * rate[e, g]
             for a in range(3):
-                row += ratio * q[e, a] * p[a] * rate[a, g]
+                row += q[e, a] * p[a] * rate[a, g]
             k[3 + e, g] = k[g, 3 + e] = slope * row
-            k[3 + e, 3 + g] = slope * ratio * q[e, g] * 2.0 * eta[g] * s[i, g, 1]
+            k[3 + e, 3 + g] = slope * q[e, g] * 2.0 * eta[g] * s[i, g, 1]
         k[3 + e, 3 + e] += 2.0 * eta[e] * f[e] * s[i, e, 2]

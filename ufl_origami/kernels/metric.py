@@ -21,13 +21,13 @@ class Elastic(NamedTuple):
         C: (n, 3, 3) membrane stiffness on (A11, A12, A22), area and thickness included.
         abar: (n, 3) rest metric.
         bbar: (n, 3) rest second form (B11, B12, B22).
-        h2_3: (n,) thickness^2 / 3: ratio of bending to membrane stiffness.
+        D: (n, 3, 3) bending stiffness on (B11, B12, B22): h^2 / 3 times that of the membrane.
     """
 
     C: np.ndarray
     abar: np.ndarray
     bbar: np.ndarray
-    h2_3: np.ndarray
+    D: np.ndarray
 
 
 def plane_stress_stiffness(

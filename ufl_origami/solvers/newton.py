@@ -92,9 +92,7 @@ class NewtonSolver:
         own = {"default": "basic", "newton": "basic"}
         self._full = self._create_snes(own.get(self.settings.method, self.settings.method))
         self._careful: PETSc.SNES | None = None
-        self.linear = Factorisation(
-            self._full.getKSP(), problem.tangent.matrix, problem.symmetric
-        )
+        self.linear = Factorisation(self._full.getKSP(), problem.tangent.matrix, problem.symmetric)
 
     def _create_snes(self, line_search: str) -> PETSc.SNES:
         matrix = self.problem.tangent.matrix

@@ -66,7 +66,7 @@ class Step:
 
     @property
     def stability(self) -> str:
-        """ "stable", "unstable" or "unknown"."""
+        """One of "stable", "unstable", "unknown"."""
         if self.negative_pivots is None:
             return "unknown"
         return "unstable" if self.negative_pivots else "stable"
@@ -147,7 +147,8 @@ class StaticPath:
             size = 0.5 * (target - time)
             log.info("step to %g failed (%s), cut to %g", target, why, size)
             if size < self.settings.smallest:
-                raise SolveError(f"step below the smallest size {self.settings.smallest:g}: {why}", time)
+                smallest = f"step below the smallest size {self.settings.smallest:g}"
+                raise SolveError(f"{smallest}: {why}", time)
             target, cuts = time + size, cuts + 1
             self._factor_at(x, time)
         trial.copy(x)

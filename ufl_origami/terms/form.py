@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.domain import extract_unique_domain
 
 from ufl_origami import compat
 from ufl_origami.configuration import State
@@ -47,7 +48,7 @@ class SheetFunctions:
 
 def deformed_jacobian(u: fem.Function) -> tuple:
     """Reference and current covariant bases as columns, (3, 2) each: J and J + grad(u) J."""
-    jacobian = ufl.Jacobian(ufl.extract_unique_domain(u))
+    jacobian = ufl.Jacobian(extract_unique_domain(u))
     return jacobian, jacobian + ufl.dot(ufl.grad(u), jacobian)
 
 

@@ -62,9 +62,7 @@ def area_load(functions: SheetFunctions, density: np.ndarray, direction: VectorF
     return _TimedForm(
         functions,
         direction,
-        lambda f: {
-            "energy": -functions.piecewise(density) * ufl.inner(f, functions.u) * ufl.dx
-        },
+        lambda f: {"energy": -functions.piecewise(density) * ufl.inner(f, functions.u) * ufl.dx},
     )
 
 

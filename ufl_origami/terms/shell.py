@@ -14,25 +14,7 @@ from ufl_origami import kernels
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.stencils import ShellBatch
 from ufl_origami.terms.base import StencilTerm
-
-
-@dataclass(frozen=True)
-class PanelData:
-    """Elastic data of each local cell.
-
-    Attributes:
-        young: (nc,) Young's modulus.
-        poisson: (nc,) Poisson's ratio.
-        thickness: (nc,) thickness.
-        curvature: (nc, 3, 3) natural curvature added to the rest shape's, a symmetric tensor in
-            space whose value along a tangent t is t.K t, positive towards the panel's normal; or
-            None.
-    """
-
-    young: np.ndarray
-    poisson: np.ndarray
-    thickness: np.ndarray
-    curvature: np.ndarray | None = None
+from ufl_origami.terms.panels import PanelData
 
 
 @dataclass(frozen=True)
@@ -94,7 +76,9 @@ class _Batch:
         stiffness = kernels.plane_stress_stiffness(
             abar, young=panels.young[cells], poisson=panels.poisson[cells], thickness=h
         )
-        self.elastic = kernels.Elastic(stiffness, abar, bbar, h**2 / 3)
+        membrane = stiffness if panels.membrane else np.zeros_like(stiffness)
+        bending = (h**2 / 3)[:, None, None] * stiffness
+        self.elastic = kernels.Elastic(membrane, abar, bbar, bending)
 
 
 def covariant(tensor: np.ndarray, x: np.ndarray, verts: np.ndarray) -> np.ndarray:
@@ -145,9 +129,7 @@ class ShellTerm(StencilTerm):
         total = np.zeros(2)
         for batch in self.batches:
             batch.measure(state, self._measure)
-            kernels.shell_energy(
-                state.x, batch.stencil.verts, batch.s, batch.elastic, batch.energy
-            )
+            kernels.shell_energy(state.x, batch.stencil.verts, batch.s, batch.elastic, batch.energy)
             total += batch.energy.sum(axis=0)
         return total
 
@@ -168,9 +150,7 @@ class ShellTerm(StencilTerm):
                 kernels.membrane_stress(current.x, verts, batch.elastic, batch.sigma)
             else:
                 step = current.x - previous.x
-                kernels.extrapolated_stress(
-                    previous.x, step, verts, batch.elastic, batch.sigma
-                )
+                kernels.extrapolated_stress(previous.x, step, verts, batch.elastic, batch.sigma)
 
     def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
         """Write the Hessians, with the membrane stress that `linearise` fixed."""
