@@ -63,7 +63,7 @@ def build(scene: Scene) -> Model:
     stiff_folds(scene, creases, configuration, constraints)
     problem = Problem(configuration, terms, constraints)
     problem.set_time(0.0)
-    return Model(sheet, configuration, problem, shell, creases, x)
+    return Model(sheet, configuration, problem, shell, creases, x, scene)
 
 
 def clamped_facets(scene: Scene, sides: EdgeSides) -> np.ndarray:
@@ -121,9 +121,10 @@ def outward_tangents(sheet: SheetMesh, sides: np.ndarray) -> np.ndarray:
 
 def clamp_tangent(clamp: ClampSpec, rest: np.ndarray) -> Callable[[float], np.ndarray]:
     """Outward tangents (n, 3) of a clamp as a function of time."""
-    if clamp.tangent is None:
+    tangent = clamp.tangent
+    if tangent is None:
         return lambda time: rest
-    return lambda time: np.broadcast_to(clamp.tangent(time, rest), rest.shape)
+    return lambda time: np.broadcast_to(tangent(time, rest), rest.shape)
 
 
 def shell_term(

@@ -9,6 +9,7 @@ import numpy as np
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.creases import EdgeFan, mesh_angles
 from ufl_origami.problem import Problem
+from ufl_origami.scene import Scene
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.terms.crease import CreaseEdges
 from ufl_origami.terms.shell import ShellTerm
@@ -34,6 +35,7 @@ class Model:
         shell: the panels' term.
         creases: name -> edges and spring.
         x: current unknowns (global vector), at rest to begin with.
+        scene: what the model was built from.
     """
 
     sheet: SheetMesh
@@ -42,6 +44,7 @@ class Model:
     shell: ShellTerm
     creases: dict[str, CreaseModel]
     x: PETSc.Vec
+    scene: Scene
 
     @property
     def state(self) -> State:

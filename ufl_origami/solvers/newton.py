@@ -88,7 +88,7 @@ class NewtonSolver:
         self._previous: PETSc.Vec | None = None
         self._mip = self._guard = self.settings.method == "default"
         self._shift_weights = shift_weights(problem)
-        self._shift, self._floor = 0.0, 0.0
+        self.shift, self._floor = 0.0, 0.0
         own = {"default": "basic", "newton": "basic"}
         self._full = self._create_snes(own.get(self.settings.method, self.settings.method))
         self._careful: PETSc.SNES | None = None
@@ -159,17 +159,17 @@ class NewtonSolver:
     def _raise_shift(self, linear: Factorisation) -> None:
         matrix = linear.matrix
         diagonal = matrix.getDiagonal()
-        if not self._shift:
+        if not self.shift:
             ratio = diagonal.copy()
             ratio.pointwiseDivide(diagonal, self._shift_weights)
-            self._shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
-        shift = self._shift / 8
+            self.shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
+        shift = self.shift / 8
         for _ in range(40):
             matrix.setDiagonal(diagonal + shift * self._shift_weights)
             if not linear.factor():
                 break
             shift *= 8
-        self._shift = shift
+        self.shift = shift
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
         reason = PETSc.SNES.ConvergedReason

@@ -86,6 +86,7 @@ class StaticPath:
         settings: step sizes.
         check: returns why a converged state is inadmissible, or an empty string.
         steps: accepted steps so far.
+        size: size of the next step; None: the first one of the settings.
     """
 
     problem: Problem
@@ -93,6 +94,7 @@ class StaticPath:
     settings: StepSettings = field(default_factory=StepSettings)
     check: Check | None = None
     steps: list[Step] = field(default_factory=list)
+    size: float | None = None
 
     def run(
         self, x: PETSc.Vec, start: float, stops: Sequence[float], on_accept: OnAccept | None = None
@@ -108,7 +110,7 @@ class StaticPath:
         Raises:
             SolveError: a step below the smallest size failed; x is the last accepted state.
         """
-        time, size = start, self.settings.first
+        time, size = start, self.size or self.settings.first
         self._factor_at(x, time)
         for stop in stops:
             while time < stop - 1e-12 * max(1.0, abs(stop)):
@@ -119,6 +121,7 @@ class StaticPath:
                     size = step.size
                 if step.iterations <= self.settings.easy:
                     size = min(self.settings.growth * size, self.settings.largest)
+                self.size = size
                 if on_accept:
                     on_accept(step, x)
         return self.steps
@@ -147,6 +150,7 @@ class StaticPath:
             size = 0.5 * (target - time)
             log.info("step to %g failed (%s), cut to %g", target, why, size)
             if size < self.settings.smallest:
+                self.problem.set_time(time)
                 smallest = f"step below the smallest size {self.settings.smallest:g}"
                 raise SolveError(f"{smallest}: {why}", time)
             target, cuts = time + size, cuts + 1
