@@ -81,7 +81,8 @@ lay_out_own_folders() {
 
 new=$UFL_ORIGAMI_CACHE/tree
 mkdir -p "$new"
-mount -t tmpfs -o mode=755 tmpfs "$new"
+# Unbindable, or binding the folder that holds it would bind the tree into itself.
+mount -t tmpfs --make-unbindable -o mode=755 tmpfs "$new"
 lay_out_host
 lay_out_system
 lay_out_settings

@@ -42,6 +42,9 @@ status=0
 in_namespace || status=$?
 if ((status == 0)); then
     say "the environment is ready after $SECONDS s"
+    for old in "${target%-*}"-*/; do
+        [[ $old == "$target/" ]] || say "an older one may be deleted: $old"
+    done
 elif ((status > 128)); then
     say "the build was interrupted; nothing half-made will be used. Run the same command again."
 else
