@@ -11,6 +11,7 @@ from ufl_origami.creases import EdgeFan, edge_fan, mesh_angles, side_ends, sprin
 from ufl_origami.errors import SceneError
 from ufl_origami.model import CreaseModel, Model, place_vertices
 from ufl_origami.problem import Problem
+from ufl_origami.quality import warn_mesh
 from ufl_origami.scene import (
     ClampSpec,
     CreaseSpec,
@@ -43,9 +44,13 @@ def build(scene: Scene) -> Model:
     Raises:
         SceneError: a crease without spring, a clamp on an edge that is no boundary, conditions
             that contradict each other.
+
+    Warns:
+        MeshWarning: the mesh cannot represent the scene's bending form (see quality.py).
     """
     sheet = scene.sheet
     sides = edge_sides(sheet)
+    warn_mesh(scene, sides)
     clamped = clamped_facets(scene, sides)
     configuration = Configuration(sheet, edge_unknowns(sheet, scene.bending, clamped))
     fans = {name: edge_fan(sheet, sides, name) for name in sheet.creases}
@@ -208,22 +213,24 @@ def stiff_folds(scene: Scene, creases, configuration: Configuration, constraints
     for spec in scene.creases:
         if spec.law or callable(spec.stiffness) or not np.isinf(spec.stiffness):
             continue
+        label = f"stiff fold {spec.name!r}"
         edges = creases[spec.name].spring
-        if (edges.slot[:, 1:] >= 0).any():
-            raise SceneError(f"crease {spec.name!r}: a stiff fold must join the first panel")
+        if (edges.slot[:, 1] >= 0).any():
+            raise SceneError(f"{label}: it must join the crease's first panel and another")
         dofs = 3 * configuration.nv + edges.slot[:, 0]
-        sign = edges.coefficient[:, 0]
-        if spec.rest_angle is None:
-            fan = creases[spec.name].fan
-            k = max(creases[spec.name].sides)
-            held = mesh_angles(scene.sheet, fan, k, scene.sheet.rest)
-            constraints.add(dofs, lambda time, held=held: held, f"stiff fold {spec.name!r}")
-        else:
-            rest = spec.rest_angle
-            value = rest if callable(rest) else (lambda time, rest=rest: rest)
-            constraints.add(
-                dofs, lambda time, f=value, s=sign: s * f(time), f"stiff fold {spec.name!r}"
-            )
+        constraints.add(dofs, held_angle(scene, spec, creases[spec.name]), label)
+
+
+def held_angle(scene: Scene, spec: CreaseSpec, crease: CreaseModel) -> Callable:
+    """Function of time giving the virtual angles (n,) of a stiff fold."""
+    sign, rest = crease.spring.coefficient[:, 0], spec.rest_angle
+    if rest is None:
+        shape = mesh_angles(scene.sheet, crease.fan, max(crease.sides), scene.sheet.rest)
+        return lambda time: shape
+    if callable(rest):
+        function: Callable[[float], float] = rest
+        return lambda time: sign * function(time)
+    return lambda time: sign * rest
 
 
 def load_terms(

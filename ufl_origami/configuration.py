@@ -67,8 +67,9 @@ class Configuration:
         self._slots, self.ns, self.ns_owned = self._number_scalars(edge_unknowns)
         self.size_local = 3 * self.nv_owned + self.ns_owned
         self.num_local = 3 * self.nv + self.ns
-        self.offset = self.comm.exscan(self.size_local) or 0
-        self.size_global = self.comm.allreduce(self.size_local)
+        sizes = self.comm.allgather(self.size_local)
+        self.offset = sum(sizes[: self.comm.rank])
+        self.size_global = sum(sizes)
         self.global_ids = self._global_ids(vertex_map).astype(PETSc.IntType)
         self._set_up_scatter()
 

@@ -19,12 +19,14 @@ from ufl_origami.sheet import SheetMesh
 from ufl_origami.stencils import BENDING_FORMS
 from ufl_origami.terms.crease import CreaseLaw
 
-Scalar = float | Callable[..., np.ndarray | float]
+TimeFunction = Callable[[float], float]
+Scalar = float | TimeFunction
+Displacement = Scalar | Callable[..., np.ndarray | float]
 Vector = Sequence[float] | Callable[[float], np.ndarray]
 Pair = tuple[str, str]
 
 
-def scalar_function(value: Scalar, label: str) -> Callable[[float], float]:
+def scalar_function(value: Scalar, label: str) -> TimeFunction:
     """Function of time from a number (proportional to time) or a function.
 
     Raises:
@@ -67,7 +69,7 @@ class MotionSpec:
     """Prescribed displacement components (None: free) of a named point, edge set or panel."""
 
     name: str
-    components: tuple[Scalar | None, Scalar | None, Scalar | None]
+    components: tuple[Displacement | None, ...]
 
 
 @dataclass(frozen=True)
@@ -181,9 +183,9 @@ class Scene:
     def move(
         self,
         name: str,
-        x: Scalar | None = None,
-        y: Scalar | None = None,
-        z: Scalar | None = None,
+        x: Displacement | None = None,
+        y: Displacement | None = None,
+        z: Displacement | None = None,
     ) -> None:
         """Prescribe displacement components of a named point, edge set or panel.
 
@@ -274,8 +276,11 @@ class Scene:
             self.sheet.edge_facets(name)
 
 
-def displacement_function(value: Scalar, rest: np.ndarray, label: str):
+def displacement_function(value: Displacement, rest: np.ndarray, label: str):
     """Function of time giving displacements (n,) of vertices with rest coordinates (n, 3)."""
-    if callable(value) and len(inspect.signature(value).parameters) > 1:
-        return lambda time: value(time, rest)
-    return scalar_function(value, label)
+    if not callable(value):
+        return scalar_function(value, label)
+    function: Callable[..., np.ndarray | float] = value
+    if len(inspect.signature(function).parameters) > 1:
+        return lambda time: function(time, rest)
+    return function

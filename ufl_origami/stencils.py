@@ -186,7 +186,8 @@ def shell_batches(sheet: SheetMesh, configuration: Configuration, clamped) -> li
     for pattern, used in enumerate(columns):
         cells = np.flatnonzero(key == pattern).astype(np.int32)
         if len(cells):
-            pick = np.ix_(cells, range(3), used)
+            columns_used = list(used)
+            picked = (a[cells][:, :, columns_used] for a in (d, slot))
             offset = np.zeros((len(cells), 3, 3))
-            batches.append(ShellBatch(cells, verts[cells], offset, c[cells], d[pick], slot[pick]))
+            batches.append(ShellBatch(cells, verts[cells], offset, c[cells], *picked))
     return batches

@@ -32,7 +32,7 @@ class SheetFunctions:
     @classmethod
     def create(cls, sheet: SheetMesh) -> "SheetFunctions":
         """Fresh displacement and time for a sheet."""
-        return cls(sheet, fem.Function(sheet.V), fem.Constant(sheet.mesh, 0.0))
+        return cls(sheet, fem.Function(sheet.V), fem.Constant(sheet.mesh, np.float64(0.0)))
 
     def set(self, state: State) -> None:
         """Copy a state into the functions."""
