@@ -17,6 +17,7 @@ import pytest
 PATIENCE = float(os.environ.get("UFL_ORIGAMI_MPI_PATIENCE", "60"))
 comm = MPI.COMM_WORLD.Dup()
 stdout = sys.stdout
+stdout.isatty = lambda: False  # mpirun gives each rank a terminal, also where there is none
 if comm.rank > 0:
     sys.stdout = tempfile.TemporaryFile("w+")
 
