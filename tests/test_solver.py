@@ -4,7 +4,7 @@ from petsc4py import PETSc
 
 import numpy as np
 import pytest
-from scenes import build, disturb, follow, strip_scene, z_fold_scene
+from scenes import build, disturb, follow, z_fold_scene
 
 from ufl_origami.errors import SolveError, StabilityWarning
 from ufl_origami.material import Material
