@@ -127,21 +127,29 @@ class NewtonSolver:
         """Tangent at an iterate, factored and shifted where the guard asks for it."""
         self.problem.linearise(self._previous if self._mip else None, x)
         self.problem.stiffness(x)
-        self._set_floor(x)
+        self._floor = min(self._floor or np.inf, self._round_off(x))
         self.problem.constrain(matrix, None, None)
         self.factor(snes.getKSP())
         if self._previous is None:
             self._previous = x.duplicate()
         x.copy(self._previous)
 
-    def _set_floor(self, x: PETSc.Vec) -> None:
+    def set_floor(self, x: PETSc.Vec) -> None:
+        """Take the tolerance floor from the tangent just assembled at an accepted state.
+
+        Iterates may lower it but not raise it: far off, near a tilt of 90 degrees, their tangent
+        has no bound.
+        """
+        self._floor = self._round_off(x)
+
+    def _round_off(self, x: PETSc.Vec) -> float:
         """Round-off of the residual: eps max K_ii max |x|."""
         diagonal = self.problem.tangent.matrix.getDiagonal()
         rest = np.abs(self.problem.configuration.sheet.rest).max(initial=0.0)
         size = self.problem.configuration.comm.allreduce(rest, op=MPI.MAX)
         size += x.norm(PETSc.NormType.INFINITY)
         eps = np.finfo(float).eps
-        self._floor = self.settings.floor * eps * diagonal.norm(PETSc.NormType.INFINITY) * size
+        return self.settings.floor * eps * diagonal.norm(PETSc.NormType.INFINITY) * size
 
     def factor(self, ksp: PETSc.KSP) -> int | None:
         """Factor the constrained tangent; with the guard, shift it until positive definite.

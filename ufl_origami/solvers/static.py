@@ -131,6 +131,7 @@ class StaticPath:
         self.problem.set_time(time)
         self.problem.linearise(None, x)
         matrix = self.problem.stiffness(x)
+        self.newton.set_floor(x)
         self.problem.constrain(matrix, None, None)
         return self.newton.factor(self.newton.linear.ksp)
 
