@@ -64,6 +64,7 @@ def build(scene: Scene) -> Model:
     terms = [shell, *springs, *load_terms(scene, configuration, sides, functions)]
     if scene.membrane == "ufl":
         terms.append(MembraneForm(functions, panel_data(scene)))
+    terms += [maker(configuration, functions) for maker in scene.terms]
     constraints = make_constraints(scene, configuration)
     stiff_folds(scene, creases, configuration, constraints)
     problem = Problem(configuration, terms, constraints)

@@ -1,6 +1,6 @@
 """A scene: a sheet, its materials and creases, and the named things done to it.
 
-A scene only declares. `Scene.build` makes exactly the terms and unknowns that it names.
+A scene only declares. `build` (build.py) makes exactly the terms and unknowns that it names.
 
 Values: a number or vector is proportional to the load factor (or time); a function of time is
 taken as it is. Displacement components may also be functions f(time, rest) of the rest
@@ -13,17 +13,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ufl_origami.configuration import Configuration
 from ufl_origami.errors import SceneError
 from ufl_origami.material import Material
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.stencils import BENDING_FORMS
+from ufl_origami.terms.base import Term
 from ufl_origami.terms.crease import CreaseLaw
+from ufl_origami.terms.form import SheetFunctions
 
 TimeFunction = Callable[[float], float]
 Scalar = float | TimeFunction
 Displacement = Scalar | Callable[..., np.ndarray | float]
 Vector = Sequence[float] | Callable[[float], np.ndarray]
 Pair = tuple[str, str]
+TermMaker = Callable[[Configuration, SheetFunctions], Term]
 
 
 def scalar_function(value: Scalar, label: str) -> TimeFunction:
@@ -121,6 +125,7 @@ class Scene:
     clamps: list[ClampSpec] = field(default_factory=list)
     loads: list[LoadSpec] = field(default_factory=list)
     curvatures: dict[str, np.ndarray] = field(default_factory=dict)
+    terms: list[TermMaker] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Check names and fill in the form's own tilt measure."""
@@ -267,6 +272,21 @@ class Scene:
         if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
             raise SceneError(f"natural curvature {name!r}: expected a symmetric (3, 3) tensor")
         self.curvatures[name] = tensor
+
+    def add_term(self, maker: TermMaker) -> None:
+        """Add an energy or force of one's own (CONTRIBUTING.md has a complete example).
+
+        Args:
+            maker: called once by `build`, on all ranks, with the numbering of the unknowns and the
+                functions that the scene's forms share; returns a FormTerm, a StencilTerm, or a
+                Term without tangent (a dead force).
+
+        Raises:
+            SceneError: not a function, for example a term that is already made.
+        """
+        if not callable(maker):
+            raise SceneError(f"add_term: expected a function that makes a term, got {maker!r}")
+        self.terms.append(maker)
 
     def _load(self, kind: str, name: str, value: Callable) -> None:
         self.loads.append(LoadSpec(kind, name, value))
