@@ -1,3 +1,49 @@
-"""Compliant origami on FEniCSx: thin elastic sheets with creases."""
+"""Compliant origami on FEniCSx: thin elastic sheets with creases.
+
+The names below are loaded when they are first used, so that importing the package costs nothing.
+`build` (a scene's discrete model, for those who solve it themselves) is in `ufl_origami.build`.
+"""
+
+from importlib import import_module
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "CreasePattern": "pattern",
+    "Material": "material",
+    "MeshError": "errors",
+    "InputError": "errors",
+    "Model": "model",
+    "NewtonSettings": "solvers.newton",
+    "PatternError": "errors",
+    "Record": "history",
+    "Scene": "scene",
+    "SceneError": "errors",
+    "SheetMesh": "sheet",
+    "SolveError": "errors",
+    "StaticResult": "run",
+    "StepSettings": "solvers.static",
+    "mesh_pattern": "meshing",
+    "read_fold": "fold_io",
+    "read_history": "history",
+    "sheet_from_arrays": "sheet",
+    "solve_static": "run",
+    "write_fold": "fold_io",
+}
+_SUBPACKAGES = ("analytic", "errors", "gallery", "plotting")
+
+__all__ = ["__version__", *_HOMES, *_SUBPACKAGES]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name from its module (PEP 562)."""
+    if name in _SUBPACKAGES:
+        return import_module(f"{__name__}.{name}")
+    if name in _HOMES:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -49,7 +49,7 @@ INTEGERS = frozenset(("step", "newton_iterations", "factorisations", "cuts", "ne
 
 @dataclass(frozen=True)
 class Record:
-    """What a history holds besides the steps themselves.
+    """What a run records besides the steps themselves.
 
     Attributes:
         energies: the energies by kind and their sum.
@@ -57,6 +57,7 @@ class Record:
         creases: creases whose mean fold angles are recorded; default all.
         points: named points whose positions are recorded; default all.
         extra: further columns: name -> function of the model (collective), giving a number.
+        fields: "vtx", "xdmf", "auto" (VTX where dolfinx has it) or "none".
     """
 
     energies: bool = True
@@ -64,6 +65,7 @@ class Record:
     creases: Sequence[str] | None = None
     points: Sequence[str] | None = None
     extra: Mapping[str, Callable[[Model], float]] = field(default_factory=dict)
+    fields: str = "auto"
 
 
 def step_row(step: Step) -> Row:
@@ -170,15 +172,18 @@ class CsvFile:
     """A CSV file that is flushed after every row; only rank 0 has one.
 
     Args:
-        path: file to create.
+        path: file to create, its folder too; an earlier file is replaced once `rows` are written.
         rows: rows to begin with.
     """
 
     def __init__(self, path: Path, rows: Sequence[Row] = ()):
-        self._file: io.TextIOWrapper = path.open("w", newline="")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(path.name + ".tmp")
+        self._file: io.TextIOWrapper = temporary.open("w", newline="")
         self._writer: csv.DictWriter | None = None
         for row in rows:
             self.write(row)
+        temporary.replace(path)
 
     def write(self, row: Row) -> None:
         """Append a row, the header before the first one."""

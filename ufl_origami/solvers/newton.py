@@ -22,6 +22,9 @@ from ufl_origami.solvers.options import option_scope
 FIRST_SHIFT = 1e-10
 """First diagonal shift, over the largest ratio of tangent diagonal to weight."""
 
+SHIFT_FACTOR = 8.0
+"""The guard first tries the last shift over this, then raises it by this."""
+
 REASONS = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
 
 
@@ -72,6 +75,10 @@ class NewtonSolver:
         settings: method and tolerances.
         prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
         options: PETSc options under that prefix.
+
+    Attributes:
+        shift: last diagonal shift over the weights, 0 before the first one.
+        report: what the solve under way did so far.
     """
 
     def __init__(
@@ -171,12 +178,12 @@ class NewtonSolver:
             ratio = diagonal.copy()
             ratio.pointwiseDivide(diagonal, self._shift_weights)
             self.shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
-        shift = self.shift / 8
+        shift = self.shift / SHIFT_FACTOR
         for _ in range(40):
             matrix.setDiagonal(diagonal + shift * self._shift_weights)
             if not linear.factor():
                 break
-            shift *= 8
+            shift *= SHIFT_FACTOR
         self.shift = shift
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:

@@ -6,10 +6,24 @@ energy is one subclass in this folder: `FormTerm` (see form.py) where UFL can sa
 """
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 
 from ufl_origami.configuration import State
+
+
+@dataclass(frozen=True)
+class Keyed:
+    """This rank's share of values under integers that do not depend on the partition.
+
+    Attributes:
+        keys: (n,) int64, unique over the ranks.
+        values: (n, ...).
+    """
+
+    keys: np.ndarray
+    values: np.ndarray
 
 
 class Term(ABC):
@@ -47,12 +61,12 @@ class Term(ABC):
     def accept(self, state: State) -> None:
         """Adopt a converged state as the branch against which angles are unwrapped."""
 
-    def history(self) -> dict[str, np.ndarray]:
-        """Arrays by name that a restart needs beside the unknowns (this rank's share)."""
+    def history(self) -> dict[str, Keyed]:
+        """Values by name that a restart needs beside the unknowns."""
         return {}
 
-    def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take back what `history` gave."""
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Take back the values of `history`, in the order of the keys that it gives now."""
 
 
 class StencilTerm(Term):

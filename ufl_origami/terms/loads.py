@@ -11,7 +11,8 @@ from dolfinx import fem
 
 from ufl_origami import kernels
 from ufl_origami.configuration import Configuration, State
-from ufl_origami.terms.base import StencilTerm, Term
+from ufl_origami.partition import pair_keys
+from ufl_origami.terms.base import Keyed, StencilTerm, Term
 from ufl_origami.terms.form import FormTerm, SheetFunctions, deformed_jacobian
 
 Amplitude = Callable[[float], float]
@@ -125,6 +126,8 @@ class EdgeMoment(StencilTerm):
         self._hinge, self._dofs, self._length, self._moment = hinge, dofs, length, moment
         self._theta, self._ref = np.zeros(len(dofs)), np.zeros(len(dofs))
         self._time = 0.0
+        sheet = configuration.sheet
+        self._keys = pair_keys(sheet.input_vertex[hinge.verts[:, :2]], sheet.num_vertices_global)
 
     def set_time(self, time: float) -> None:
         """Time at which the moment is taken."""
@@ -163,3 +166,11 @@ class EdgeMoment(StencilTerm):
     def accept(self, state: State) -> None:
         """Unwrap the rotation against this state from now on."""
         self._ref[:] = self._angles(state)
+
+    def history(self) -> dict[str, Keyed]:
+        """Rotation (n,) of the accepted state, by edge."""
+        return {"rotation": Keyed(self._keys, self._ref)}
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Unwrap the rotation against that of an earlier run."""
+        self._ref[:] = values["rotation"]

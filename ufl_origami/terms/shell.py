@@ -5,7 +5,7 @@ the second fundamental form B a sum over the three tilts (Grinspun et al. 2006,
 doi:10.1111/j.1467-8659.2006.00974.x; the tilts of each form are in stencils.py).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from ufl_origami import kernels
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.stencils import ShellBatch
-from ufl_origami.terms.base import StencilTerm
+from ufl_origami.terms.base import Keyed, StencilTerm
 from ufl_origami.terms.panels import PanelData
 
 
@@ -110,6 +110,8 @@ class ShellTerm(StencilTerm):
         measure: str = "tan",
     ):
         self._measure = kernels.MEASURES[measure]
+        self._input_cell = configuration.sheet.input_cell
+        self.panels = panels
         self.batches = [_Batch(table, ghosts, configuration) for table, ghosts in batches]
         for batch in self.batches:
             batch.set_rest(rest, panels, self._measure)
@@ -166,6 +168,29 @@ class ShellTerm(StencilTerm):
         for batch in self.batches:
             batch.measure(state, self._measure)
             batch.theta_ref[:] = batch.theta
+
+    def second_forms(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Local cells, rest metrics (A11, A12, A22) and second forms (B11, B12, B22) by batch."""
+        for batch in self.batches:
+            batch.measure(state, self._measure)
+            b = np.zeros((len(batch.t), 3))
+            kernels.second_form(state.x, batch.stencil.verts, batch.s, b)
+            yield batch.table.cells, batch.elastic.abar, b
+
+    def history(self) -> dict[str, Keyed]:
+        """Hinge angles (n, 3) of the accepted state, by input cell."""
+        cells = [self._input_cell[batch.table.cells] for batch in self.batches]
+        angles = [batch.theta_ref for batch in self.batches]
+        none = np.empty(0, dtype=np.int64), np.empty((0, 3))
+        keys, values = np.concatenate([none[0], *cells]), np.concatenate([none[1], *angles])
+        return {"hinge_angle": Keyed(keys, values)}
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Unwrap hinge angles against those of an earlier run."""
+        ends = np.cumsum([len(batch.theta_ref) for batch in self.batches])
+        parts = np.split(values["hinge_angle"], ends[:-1]) if self.batches else []
+        for batch, part in zip(self.batches, parts, strict=True):
+            batch.theta_ref[:] = part
 
     def largest_tilt(self, state: State) -> float:
         """Largest |tilt| (radians) of this rank's triangles."""
