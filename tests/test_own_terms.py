@@ -71,7 +71,8 @@ def test_spring_and_support_carry_the_load_together():
     u = model.position("x1y0") - [10.0, 0.0, 0.0]
     spring = 5.0 * (u @ u) * u
     assert spring[2] > 0.1
-    assert model.reaction("x0") + [0.0, 0.0, 1.0] - spring == pytest.approx([0, 0, 0], abs=1e-6)
+    load = np.array([0.0, 0.0, 1.0])
+    assert model.reaction("x0") + load - spring == pytest.approx([0, 0, 0], abs=1e-6)
 
 
 def test_form_force_without_energy_makes_the_tangent_unsymmetric():
