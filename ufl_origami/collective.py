@@ -1,9 +1,12 @@
-"""Work done on rank 0 whose failure must reach every rank."""
+"""Failures that must reach every rank, and reductions over the ranks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from mpi4py import MPI
+
+import numpy as np
 
 from ufl_origami.errors import InputError
 
@@ -36,3 +39,51 @@ def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
             raise kind(message)
         raise RuntimeError(f"rank 0 raised {kind.__name__}: {message}")
     return value
+
+
+@contextmanager
+def together(comm: MPI.Comm) -> Iterator[None]:
+    """Let an InputError of any rank inside the block be raised on all ranks.
+
+    Args:
+        comm: communicator; all ranks must enter, and the block must not communicate.
+    """
+    error = None
+    try:
+        yield
+    except InputError as caught:
+        error = caught
+    told = comm.allgather(None if error is None else (type(error), str(error)))
+    if error is not None:
+        raise error
+    for kind, message in filter(None, told):
+        raise kind(message)
+
+
+def reduced(comm: MPI.Comm, values: np.ndarray, op: MPI.Op = MPI.SUM) -> np.ndarray:
+    """Entry-wise reduction of a numeric array over the ranks, the same on all of them.
+
+    Args:
+        comm: communicator; the call is collective.
+        values: array of the same shape and type on all ranks.
+        op: reduction.
+    """
+    send = np.ascontiguousarray(values)
+    result = np.empty_like(send)
+    comm.Allreduce(send, result, op=op)
+    return result
+
+
+def binned(comm: MPI.Comm, bins: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
+    """Sums (count, ...) over all ranks of weights (n, ...) by bin (n,) in 0..count-1.
+
+    Args:
+        comm: communicator; the call is collective.
+        bins: bin of each row.
+        weights: rows to be summed.
+        count: number of bins, the same on all ranks.
+    """
+    size = int(np.prod(weights.shape[1:]))
+    columns = np.asarray(weights, dtype=float).reshape(len(bins), size).T
+    sums = [np.bincount(bins, column, minlength=count).astype(float) for column in columns]
+    return reduced(comm, np.stack(sums, axis=1)).reshape(count, *weights.shape[1:])

@@ -39,3 +39,7 @@ class MeshWarning(UserWarning):
 
 class StabilityWarning(UserWarning):
     """An accepted equilibrium with negative directions of the tangent: it is unstable."""
+
+
+class SupportWarning(UserWarning):
+    """A piece of the sheet that no condition keeps from turning: the tangent at rest is singular."""
