@@ -56,7 +56,7 @@ def bits(values: np.ndarray) -> np.ndarray:
 
 
 def declaration(scene: Scene) -> dict[str, str]:
-    """What a scene declares, part by part, as text; of a function only that it is one."""
+    """What a scene declares, part by part, as text; of functions and objects only their kind."""
     return {
         part.name: text(getattr(scene, part.name)) for part in fields(scene) if part.name != "sheet"
     }
@@ -73,4 +73,6 @@ def text(value: object) -> str:
         return f"[{', '.join(map(text, value))}]"
     if isinstance(value, np.ndarray | np.generic):
         return text(value.tolist())
-    return "function" if callable(value) else repr(value)
+    if value is None or isinstance(value, bool | int | float | str):
+        return repr(value)
+    return "function" if callable(value) else type(value).__name__
