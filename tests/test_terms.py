@@ -13,14 +13,18 @@ from ufl_origami.terms.crease import MomentLaw
 pytestmark = pytest.mark.mpi
 
 
+STRUCTURE = {"director": "unstructured", "averaged": "structured"}
+
+
 def z_fold(**kind):
-    scene = z_fold_scene(0.4, 0.3, nu=0.3, bending=kind.get("bending", "director"))
+    bending = kind.get("bending", "director")
+    scene = z_fold_scene(0.4, 0.3, nu=0.3, bending=bending, structure=STRUCTURE[bending])
     scene.membrane = kind.get("membrane", "kernel")
     return scene
 
 
 def loaded_strip(bending="director"):
-    scene = strip_scene((6, 2), nu=0.3, bending=bending, structure="unstructured")
+    scene = strip_scene((6, 2), nu=0.3, bending=bending, structure=STRUCTURE[bending])
     scene.line_load("x1", (3.0, 1.0, 4.0))
     scene.area_load(scene.sheet.panel_names[0], (0.3, -0.2, 0.5))
     scene.edge_moment("x1", 20.0)

@@ -5,21 +5,27 @@ from collections.abc import Callable
 import numpy as np
 
 from ufl_origami import kernels
+from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.constraints import Constraints
-from ufl_origami.creases import EdgeFan, edge_fan, mesh_angles, side_ends, spring_edges
+from ufl_origami.creases import EdgeFan, edge_fan, mesh_angles, side_ends
 from ufl_origami.errors import SceneError
-from ufl_origami.model import CreaseModel, Model, place_vertices
+from ufl_origami.model import Model, place_vertices
 from ufl_origami.problem import Problem
 from ufl_origami.quality import warn_mesh
 from ufl_origami.scene import (
     ClampSpec,
-    CreaseSpec,
     LoadSpec,
     Scene,
     displacement_function,
 )
 from ufl_origami.sheet import SheetMesh
+from ufl_origami.springs import (
+    crease_springs,
+    first_springs,
+    hold_stiff_folds,
+    spring_terms,
+)
 from ufl_origami.stencils import (
     DIRECTOR,
     EdgeSides,
@@ -31,7 +37,6 @@ from ufl_origami.stencils import (
 )
 from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
-from ufl_origami.terms.crease import CreaseTerm, LinearLaw
 from ufl_origami.terms.form import SheetFunctions
 from ufl_origami.terms.membrane import MembraneForm
 from ufl_origami.terms.panels import PanelData
@@ -59,16 +64,18 @@ def build(scene: Scene) -> Model:
     rest = configuration.state(x, 0.0)
     tables = shell_batches(sheet, configuration, clamped)
     shell = shell_term(scene, configuration, tables, rest)
-    creases, springs = crease_terms(scene, configuration, fans, rest_angles)
+    springs = crease_springs(scene, configuration, fans, rest_angles)
     functions = SheetFunctions.create(sheet)
-    terms = [shell, *springs, *load_terms(scene, configuration, sides, functions)]
+    terms = [shell, *spring_terms(springs, configuration)]
+    terms += load_terms(scene, configuration, sides, functions)
     if scene.membrane == "ufl":
         terms.append(MembraneForm(functions, panel_data(scene)))
     terms += [maker(configuration, functions) for maker in scene.terms]
     constraints = make_constraints(scene, configuration)
-    stiff_folds(scene, creases, configuration, constraints)
+    hold_stiff_folds(springs, constraints)
     problem = Problem(configuration, terms, constraints)
     problem.set_time(0.0)
+    creases = first_springs(springs)
     return Model(sheet, configuration, problem, shell, creases, x, scene)
 
 
@@ -79,9 +86,10 @@ def clamped_facets(scene: Scene, sides: EdgeSides) -> np.ndarray:
         return np.empty(0, dtype=np.int32)
     count = np.zeros(len(scene.sheet.edge_vertices()), dtype=int)
     count[sides.facet] = sides.count
-    for clamp, part in zip(scene.clamps, facets, strict=True):
-        if (count[part] > 1).any():
-            raise SceneError(f"clamp {clamp.name!r}: an edge with two triangles is no boundary")
+    with together(scene.sheet.comm):
+        for clamp, part in zip(scene.clamps, facets, strict=True):
+            if (count[part] > 1).any():
+                raise SceneError(f"clamp {clamp.name!r}: an edge of two triangles is no boundary")
     return np.unique(np.concatenate(facets))
 
 
@@ -145,55 +153,11 @@ def shell_term(
             rows, edges = np.nonzero(np.isin(sheet.cell_edges[table.cells], facets))
             if len(rows):
                 tangents = outward_tangents(sheet, 3 * table.cells[rows] + edges)
-                table.offset[rows, edges] = tangents
-                found.append(Ghosts(rows, edges, clamp_tangent(clamp, tangents)))
+                given = clamp_tangent(clamp, tangents)
+                table.offset[rows, edges] = tangents if clamp.natural else given(0.0)
+                found.append(Ghosts(rows, edges, given))
     batches = list(zip(tables, ghosts, strict=True))
     return ShellTerm(configuration, batches, panel_data(scene), rest, scene.measure or "tan")
-
-
-def spring_sides(sheet: SheetMesh, fan: EdgeFan, spec: CreaseSpec) -> tuple[int, int]:
-    """Positions in the fan of the two panels that a spring joins.
-
-    Raises:
-        SceneError: no pair where there are more than two panels, or a panel not at the crease.
-    """
-    if spec.pair is None:
-        if len(fan.panels) != 2:
-            names = [sheet.panel_names[p] for p in fan.panels]
-            raise SceneError(f"crease {spec.name!r} joins {names}: name the pair of each spring")
-        return 0, 1
-    found = []
-    for panel in spec.pair:
-        at = np.flatnonzero(fan.panels == sheet.panel_names.index(panel))
-        if len(at) != 1:
-            raise SceneError(f"crease {spec.name!r}: panel {panel!r} is not at it exactly once")
-        found.append(int(at[0]))
-    return found[0], found[1]
-
-
-def crease_terms(scene: Scene, configuration: Configuration, fans, rest_angles):
-    """Springs of all creases; those of infinite stiffness become constraints instead."""
-    missing = set(scene.sheet.creases) - {spec.name for spec in scene.creases}
-    if missing:
-        raise SceneError(f"creases without stiffness: {sorted(missing)}")
-    models: dict[str, CreaseModel] = {}
-    terms: list[Term] = []
-    for spec in scene.creases:
-        fan = fans[spec.name]
-        pair = spring_sides(scene.sheet, fan, spec)
-        edges = spring_edges(fan, configuration, pair, rest_angles[spec.name])
-        models.setdefault(spec.name, CreaseModel(fan, edges, pair))
-        if spec.law is None and not callable(spec.stiffness) and np.isinf(spec.stiffness):
-            continue
-        rest = spec.rest_angle
-        if rest is None:
-            rest = edges.constant + sum(
-                edges.coefficient[:, i] * rest_angles[spec.name][:, k - 1]
-                for i, k in enumerate(k for k in pair if k)
-            )
-        law = spec.law or LinearLaw(spec.stiffness, rest)
-        terms.append(CreaseTerm(configuration, edges, law))
-    return models, terms
 
 
 def make_constraints(scene: Scene, configuration: Configuration) -> Constraints:
@@ -207,31 +171,6 @@ def make_constraints(scene: Scene, configuration: Configuration) -> Constraints:
                 f = displacement_function(value, scene.sheet.rest[vertices], label)
                 constraints.add(3 * vertices + axis, f, label)
     return constraints
-
-
-def stiff_folds(scene: Scene, creases, configuration: Configuration, constraints) -> None:
-    """Hold the virtual angle of creases with infinite stiffness at their rest angle."""
-    for spec in scene.creases:
-        if spec.law or callable(spec.stiffness) or not np.isinf(spec.stiffness):
-            continue
-        label = f"stiff fold {spec.name!r}"
-        edges = creases[spec.name].spring
-        if (edges.slot[:, 1] >= 0).any():
-            raise SceneError(f"{label}: it must join the crease's first panel and another")
-        dofs = 3 * configuration.nv + edges.slot[:, 0]
-        constraints.add(dofs, held_angle(scene, spec, creases[spec.name]), label)
-
-
-def held_angle(scene: Scene, spec: CreaseSpec, crease: CreaseModel) -> Callable:
-    """Function of time giving the virtual angles (n,) of a stiff fold."""
-    sign, rest = crease.spring.coefficient[:, 0], spec.rest_angle
-    if rest is None:
-        shape = mesh_angles(scene.sheet, crease.fan, max(crease.sides), scene.sheet.rest)
-        return lambda time: shape
-    if callable(rest):
-        function: Callable[[float], float] = rest
-        return lambda time: sign * function(time)
-    return lambda time: sign * rest
 
 
 def load_terms(
@@ -293,15 +232,17 @@ def edge_moment(
     sheet = scene.sheet
     facets = sheet.edge_facets(spec.name)
     owned = np.flatnonzero(np.isin(sides.facet[: 3 * sheet.num_owned_cells], facets))
-    if (sides.count[owned] > 1).any():
-        raise SceneError(f"edge moment {spec.name!r}: an edge with two triangles is no boundary")
+    with together(sheet.comm):
+        if (sides.count[owned] > 1).any():
+            raise SceneError(f"edge moment {spec.name!r}: an edge of two triangles is no boundary")
     ends = side_ends(sheet, owned)
     verts = np.column_stack([ends, sheet.cells.ravel()[owned], ends[:, 0]]).astype(np.int32)
     slots = np.zeros((len(owned), 0), dtype=np.int32)
     if scene.bending == "director":
         slots = configuration.slot(DIRECTOR)[sides.facet[owned]][:, None]
-        if (slots < 0).any():
-            raise SceneError(f"edge moment {spec.name!r}: the edge is clamped")
+        with together(sheet.comm):
+            if (slots < 0).any():
+                raise SceneError(f"edge moment {spec.name!r}: the edge is clamped")
     n = len(owned)
     hinge = kernels.HingeStencil(
         verts,

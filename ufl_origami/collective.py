@@ -48,15 +48,15 @@ def together(comm: MPI.Comm) -> Iterator[None]:
     Args:
         comm: communicator; all ranks must enter, and the block must not communicate.
     """
-    error = None
+    error: InputError | None = None
     try:
         yield
     except InputError as caught:
         error = caught
-    told = comm.allgather(None if error is None else (type(error), str(error)))
+    told = comm.allgather([] if error is None else [(type(error), str(error))])
     if error is not None:
         raise error
-    for kind, message in filter(None, told):
+    for kind, message in (entry for entries in told for entry in entries):
         raise kind(message)
 
 

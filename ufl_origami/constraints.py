@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration
 from ufl_origami.errors import SceneError
 
@@ -36,23 +37,37 @@ class Constraints:
         self.dofs = np.unique(np.concatenate([self.dofs, position[owned]])).astype(np.int64)
 
     def values(self, time: float) -> np.ndarray:
-        """Prescribed values of `dofs` at a load factor or time.
+        """Prescribed values of `dofs` at a load factor or time."""
+        result = np.empty(len(self.dofs))
+        for position, owned, values, _ in self._parts:
+            result[np.searchsorted(self.dofs, position)] = _entries(values(time), owned)
+        return result
+
+    def check(self, time: float) -> None:
+        """Refuse values at a load factor or time that no state can have; collective.
 
         Raises:
-            SceneError: two conditions prescribe different values, or a value is not finite.
+            SceneError: on all ranks, when two conditions prescribe different values or a value is
+                not finite.
         """
-        result = np.full(len(self.dofs), np.nan)
-        for position, owned, values, label in self._parts:
-            given = np.asarray(values(time), dtype=float)
-            given = given[owned] if given.ndim else np.full(len(owned), float(given))
-            if not np.isfinite(given).all():
-                raise SceneError(f"condition {label!r} at {time:g}: value is not finite")
-            at = np.searchsorted(self.dofs, position)
-            clash = np.isfinite(result[at]) & ~np.isclose(result[at], given, rtol=1e-12, atol=1e-14)
-            if clash.any():
-                raise SceneError(
-                    f"condition {label!r} at {time:g}: value {given[clash][0]:g} contradicts "
-                    f"{result[at][clash][0]:g} prescribed before on the same vertex"
-                )
-            result[at] = given
-        return result
+        with together(self.configuration.comm):
+            result = np.full(len(self.dofs), np.nan)
+            for position, owned, values, label in self._parts:
+                given = _entries(values(time), owned)
+                if not np.isfinite(given).all():
+                    raise SceneError(f"condition {label!r} at {time:g}: value is not finite")
+                at = np.searchsorted(self.dofs, position)
+                same = np.isclose(result[at], given, rtol=1e-12, atol=1e-14)
+                clash = np.isfinite(result[at]) & ~same
+                if clash.any():
+                    raise SceneError(
+                        f"condition {label!r} at {time:g}: value {given[clash][0]:g} contradicts "
+                        f"{result[at][clash][0]:g} prescribed before on the same vertex"
+                    )
+                result[at] = given
+
+
+def _entries(given: np.ndarray | float, owned: np.ndarray) -> np.ndarray:
+    """Values of the owned entries of one condition, from one value for all or one for each."""
+    values = np.asarray(given, dtype=float)
+    return values[owned] if values.ndim else np.full(len(owned), float(values))

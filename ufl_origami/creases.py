@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ufl_origami import kernels
+from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration
 from ufl_origami.errors import SceneError
 from ufl_origami.sheet import SheetMesh
@@ -50,11 +51,12 @@ def edge_fan(sheet: SheetMesh, sides: EdgeSides, name: str) -> EdgeFan:
         {tuple(sheet.cell_panel[at[sides.facet[at] == f] // 3]) for f in facets[:1]}
     )
     panels = np.array(next((p for s in shapes for p in s), (0, 0)), dtype=int)
-    if not (counts == len(panels)).all():
-        raise SceneError(f"crease {name!r} has {counts} panels along its length: split its name")
-    table = at.reshape(-1, len(panels))
-    if len(facets) and (sheet.cell_panel[table // 3] != panels).any():
-        raise SceneError(f"crease {name!r} joins different panels along its length: split its name")
+    with together(sheet.comm):
+        if not (counts == len(panels)).all():
+            raise SceneError(f"crease {name!r} has {counts} panels along its length: split it")
+        table = at.reshape(-1, len(panels))
+        if (sheet.cell_panel[table // 3] != panels).any():
+            raise SceneError(f"crease {name!r} joins different panels along its length: split it")
     ends = side_ends(sheet, table)
     length = np.linalg.norm(sheet.rest[ends[:, 0, 1]] - sheet.rest[ends[:, 0, 0]], axis=1)
     consistent = np.where(ends[:, :, 0] == ends[:, :1, 1], 1, -1)

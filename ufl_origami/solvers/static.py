@@ -11,10 +11,11 @@ import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from petsc4py import PETSc
 
-from ufl_origami.errors import SolveError, StabilityWarning
+from ufl_origami.errors import InputError, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
 
@@ -108,8 +109,11 @@ class StaticPath:
             on_accept: called with each accepted step and its unknowns.
 
         Raises:
+            InputError: the stops do not increase.
             SolveError: a step below the smallest size failed; x is the last accepted state.
         """
+        if any(later <= earlier for earlier, later in pairwise(stops)):
+            raise InputError(f"stops {list(stops)} do not increase")
         time, size = start, self.size or self.settings.first
         self._factor_at(x, time)
         for stop in stops:
@@ -171,6 +175,7 @@ class StaticPath:
             cuts=cuts,
         )  # fmt: skip
         self.steps.append(step)
+        PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
         if negative:
             text = f"state at {target:g} is unstable: {negative} negative pivots of the tangent"
             warnings.warn(text, StabilityWarning, stacklevel=3)
@@ -186,6 +191,7 @@ class StaticPath:
         """Linear solution of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
         problem = self.problem
         matrix = problem.tangent.insert(problem.state(x))
+        problem.constraints.check(target)
         problem.set_time(target)
         rhs, known = x.duplicate(), x.duplicate()
         problem.forces(x, rhs)
