@@ -30,12 +30,21 @@ def _check(code: int, function: str) -> None:
         raise RuntimeError(f"{function} failed with PETSc error code {code}")
 
 
-def block_indices(dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Row and column of each entry of dense blocks (n, k, k), flattened, -1 where unused."""
-    n, k = dofs.shape
-    rows = np.broadcast_to(dofs[:, :, None], (n, k, k))
-    cols = np.broadcast_to(dofs[:, None, :], (n, k, k))
-    return rows.reshape(-1), cols.reshape(-1)
+def pattern(batches: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column of each entry of dense blocks, batch after batch, -1 where unused.
+
+    Args:
+        batches: unknowns (n, k) of the stencils; their blocks are (n, k, k).
+    """
+    size = sum(n * k * k for n, k in (dofs.shape for dofs in batches))
+    rows, cols, start = np.empty(size, PETSc.IntType), np.empty(size, PETSc.IntType), 0
+    for dofs in batches:
+        n, k = dofs.shape
+        part = slice(start, start + n * k * k)
+        rows[part].reshape(n, k, k)[:] = dofs[:, :, None]
+        cols[part].reshape(n, k, k)[:] = dofs[:, None, :]
+        start = part.stop
+    return rows, cols
 
 
 class Tangent:
@@ -74,9 +83,7 @@ class Tangent:
         """Hand the pattern to PETSc and lay out one array of values with a view a batch."""
         stencils = [batch for term in self.stencil_terms for batch in term.stencils()]
         diagonal = self._diagonal()
-        indices = [block_indices(batch) for batch in stencils] + [(diagonal, diagonal)]
-        rows = np.concatenate([i for i, _ in indices]).astype(PETSc.IntType)
-        cols = np.concatenate([j for _, j in indices]).astype(PETSc.IntType)
+        rows, cols = pattern([*stencils, diagonal[:, None]])
         code = _petsc.MatSetPreallocationCOOLocal(
             self.matrix.handle, len(rows), rows.ctypes.data, cols.ctypes.data
         )

@@ -24,6 +24,19 @@ def spread(index_map, values: np.ndarray) -> np.ndarray:
     return vector.array.copy()
 
 
+def gather_marks(index_map, local: np.ndarray) -> np.ndarray:
+    """Sorted local indices of what any rank marks in an index map, ghosts included; collective.
+
+    A rank may own a vertex of a named edge without having a triangle at that edge.
+    """
+    marks = la.vector(index_map, 1, dtype=np.int64)
+    marks.array[:] = 0
+    marks.array[local] = 1
+    marks.scatter_reverse(la.InsertMode.add)
+    marks.scatter_forward()
+    return np.flatnonzero(marks.array)
+
+
 def cells_per_edge(sheet: SheetMesh) -> np.ndarray:
     """Number of triangles at each local facet (nf,), as its owner counts them."""
     facet_map = sheet.mesh.topology.index_map(1)

@@ -6,7 +6,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.configuration import Configuration, State
+from ufl_origami.configuration import Configuration, State, gather_marks
 from ufl_origami.creases import EdgeFan, mesh_angles
 from ufl_origami.problem import Problem
 from ufl_origami.scene import Scene
@@ -113,10 +113,12 @@ class FoldAngles:
 
 
 def place_vertices(sheet: SheetMesh, name: str) -> np.ndarray:
-    """Local vertices of a named point, edge set or panel (this rank's)."""
+    """Local vertices, ghosts included, of a named point, edge set or panel; collective."""
     if name in sheet.points:
         vertex = sheet.points[name]
         return np.array([vertex] if vertex >= 0 else [], dtype=np.int64)
     if name in sheet.panel_names:
-        return np.unique(sheet.cells[sheet.panel_cells(name)])
-    return np.unique(sheet.edge_vertices()[sheet.edge_facets(name)])
+        here = sheet.cells[sheet.panel_cells(name)]
+    else:
+        here = sheet.edge_vertices()[sheet.edge_facets(name)]
+    return gather_marks(sheet.V.dofmap.index_map, np.unique(here))

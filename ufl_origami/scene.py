@@ -47,13 +47,19 @@ def vector_function(value: Vector, label: str) -> Callable[[float], np.ndarray]:
     """Function of time from a vector (proportional to time) or a function.
 
     Raises:
-        SceneError: not three finite numbers.
+        SceneError: not three finite numbers; for a function, when it is called.
     """
+
+    def checked(given) -> np.ndarray:
+        vector = np.asarray(given, dtype=float)
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            raise SceneError(f"{label}: expected three finite numbers, got {given}")
+        return vector
+
     if callable(value):
-        return value
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise SceneError(f"{label}: expected three finite numbers, got {value}")
+        function: Callable[[float], np.ndarray] = value
+        return lambda time: checked(function(time))
+    vector = checked(value)
     return lambda time: vector * time
 
 
@@ -83,12 +89,12 @@ class ClampSpec:
     Attributes:
         name: boundary.
         tangent: function of time and rest tangents (n, 3), giving (3,) or (n, 3), or None.
-        rest_tangent: tangent (3,) of the stress-free state, None: that of the rest face.
+        natural: whether the rest face is stress-free, else the prescribed tangent at time 0 is.
     """
 
     name: str
     tangent: Callable[[float, np.ndarray], np.ndarray] | None
-    rest_tangent: np.ndarray | None
+    natural: bool = True
 
 
 @dataclass(frozen=True)
@@ -170,7 +176,8 @@ class Scene:
             pair: the two panels that the spring joins, for creases of more than two.
 
         Raises:
-            SceneError: unknown crease, neither or both of stiffness and law, negative stiffness.
+            SceneError: unknown crease, neither or both of stiffness and law, law with a rest angle,
+                negative stiffness, rest angle beyond a full turn (degrees?).
         """
         self.sheet.edge_facets(name)
         if name not in self.sheet.creases:
@@ -179,6 +186,10 @@ class Scene:
             raise SceneError(f"crease {name!r}: give a stiffness or a law, and only one of them")
         if stiffness is not None and not callable(stiffness) and not stiffness >= 0:
             raise SceneError(f"crease {name!r}: stiffness {stiffness} must not be negative")
+        if law is not None and rest_angle is not None:
+            raise SceneError(f"crease {name!r}: a law has its own rest angle")
+        if rest_angle is not None and not callable(rest_angle) and not abs(rest_angle) < 2 * np.pi:
+            raise SceneError(f"crease {name!r}: rest angle {rest_angle} is no angle in radians")
         for panel in pair or ():
             self.sheet.panel_cells(panel)
         self.creases.append(
@@ -220,7 +231,7 @@ class Scene:
                 outward tangents; default: held as at rest.
         """
         self.sheet.edge_facets(name)
-        self.clamps.append(ClampSpec(name, tangent, None))
+        self.clamps.append(ClampSpec(name, tangent))
 
     def symmetry(self, name: str, axis: str) -> None:
         """Make a boundary the trace of a mirror plane normal to an axis ("x", "y" or "z")."""
@@ -232,7 +243,7 @@ class Scene:
         def outward(time: float, rest: np.ndarray) -> np.ndarray:
             return np.where(rest @ normal > 0, 1.0, -1.0)[:, None] * normal
 
-        self.clamps.append(ClampSpec(name, outward, normal))
+        self.clamps.append(ClampSpec(name, outward, natural=False))
 
     def point_load(self, name: str, force: Vector) -> None:
         """Dead force (3,) on a named point."""
@@ -301,6 +312,16 @@ def displacement_function(value: Displacement, rest: np.ndarray, label: str):
     if not callable(value):
         return scalar_function(value, label)
     function: Callable[..., np.ndarray | float] = value
-    if len(inspect.signature(function).parameters) > 1:
+    if _required_arguments(function) > 1:
         return lambda time: function(time, rest)
     return function
+
+
+def _required_arguments(function: Callable) -> int:
+    """Number of positional arguments without default; 1 where Python cannot tell (builtins)."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except ValueError:
+        return 1
+    positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return sum(p.kind in positional and p.default is p.empty for p in parameters)

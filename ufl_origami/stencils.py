@@ -11,6 +11,8 @@ crease of two or more panels) is in these coefficients, so one kernel serves the
 | clamped boundary | theta to the ghost vertex | theta to the ghost vertex |
 | crease of two panels | (theta - phi)/2 | (theta - phi)/2 + xi, (theta - phi)/2 - xi |
 | crease of m > 2 panels | as director | xi on panel 1, theta_1s - phi_1s - xi on panel s |
+
+Where a panel at a crease is oriented against the first one, phi and xi change sign on it.
 """
 
 from dataclasses import dataclass
@@ -146,21 +148,22 @@ def _tilts(sheet: SheetMesh, sides: EdgeSides, configuration, clamped) -> _Tilts
     tilts = _Tilts(np.zeros(n), np.zeros((n, 2)), np.full((n, 2), -1, dtype=np.int32))
     crease = np.isin(facet, crease_facets(sheet))
     fork = crease & (count > 2)
-    side = np.where(rank == 0, 1.0, -1.0)
+    orientation = np.where(rank == 0, 1, sides.consistent[:n])
+    side = np.where(rank == 0, 1.0, -orientation)
     tilts.c[count == 2] = 0.5
     tilts.c[np.isin(facet, clamped)] = 1.0
     tilts.c[fork & (rank > 0)] = 1.0
     fold = crease & (count == 2)
     if fold.any():
-        tilts.put(fold, 1, -0.5, configuration.slot(FOLD_ANGLE)[facet])
+        tilts.put(fold, 1, -0.5 * orientation, configuration.slot(FOLD_ANGLE)[facet])
     if DIRECTOR in configuration.edge_unknowns:
         director = configuration.slot(DIRECTOR)[facet]
         tilts.put(director >= 0, 0, side, director)
         follower = fork & (rank > 0)
-        tilts.put(follower, 0, -sides.consistent[:n], director)
+        tilts.put(follower, 0, side, director)
         for pair in range(1, int(count[fork].max(initial=0))):
             phi = configuration.slot(fold_angle_name(pair))[facet]
-            tilts.put(follower & (rank == pair), 1, -sides.consistent[:n], phi)
+            tilts.put(follower & (rank == pair), 1, side, phi)
     return tilts
 
 

@@ -255,7 +255,10 @@ class NewtonSolver:
 
 
 def shift_weights(problem: Problem) -> PETSc.Vec:
-    """Mass-like weights: lumped area at vertices, area squared at edge unknowns (rest state)."""
+    """Mass-like weights: lumped area at vertices, area squared at edge unknowns (rest state).
+
+    Prescribed unknowns weigh nothing: a shift of their unit diagonal would change their values.
+    """
     configuration = problem.configuration
     sheet = configuration.sheet
     n = sheet.num_owned_cells
@@ -272,4 +275,5 @@ def shift_weights(problem: Problem) -> PETSc.Vec:
         np.add.at(local, 3 * configuration.nv + slot[used], weight)
     vector = configuration.create_vector()
     configuration.add_to_global(local, vector)
+    vector.array_w[problem.constraints.dofs] = 0.0
     return vector

@@ -62,9 +62,8 @@ class _Batch:
         measure(self.t, self.s)
 
     def set_rest(self, state: State, panels: PanelData, measure) -> None:
-        """Adopt a state as stress-free."""
+        """Adopt a state, with the ghosts as the table has them, as stress-free."""
         cells, verts = self.table.cells, self.stencil.verts
-        self.place_ghosts(state.time)
         self.measure(state, measure)
         self.theta_ref[:] = self.theta
         abar, bbar = np.zeros((len(cells), 3)), np.zeros((len(cells), 3))
