@@ -164,3 +164,28 @@ def test_steps_stop_exactly_where_asked_and_grow_when_easy():
     assert times == sorted(times)
     sizes = [step.size for step in path.steps]
     assert sizes[1] == pytest.approx(1.5 * sizes[0])
+
+
+@pytest.mark.mpi
+def test_an_unstable_branch_is_followed_and_reported():
+    model = build(compressed_strip(3.0 * EULER_STRAIN))
+    with pytest.warns(StabilityWarning):
+        path = follow(model, (0.2, 0.6, 1.0), first=0.2)
+    assert [bool(step.negative_pivots) for step in path.steps][-1]
+    assert path.steps[0].stability == "stable"
+    assert np.abs(model.state.q[2 : 3 * len(model.state.x) : 3]).max(initial=0.0) < 1e-9
+
+
+@pytest.mark.mpi
+def test_a_roll_up_in_one_step_is_cut_where_its_turn_would_be_a_guess():
+    scene = Scene(
+        rectangle(LENGTH, 1.0, n=(60, 4), structure="structured"), Material(YOUNG, 0.0, THICKNESS)
+    )
+    scene.fix("x0")
+    scene.clamp("x0")
+    scene.fix("sheet", "y")
+    scene.edge_moment("x1", 2 * np.pi * 100.0 / LENGTH)
+    model = build(scene)
+    path = follow(model, first=1.0)
+    assert path.steps[0].cuts
+    assert model.energies()["bending"] == pytest.approx(0.5 * 100 * (2 * np.pi) ** 2 / 10, rel=0.01)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
@@ -112,6 +113,13 @@ class Problem:
         """
         rows = (self.constraints.dofs + self.configuration.offset).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, known, rhs)
+
+    def largest_turn(self, vector: PETSc.Vec, trial: PETSc.Vec) -> float:
+        """Largest change (radians, to first order) of an unwrapped angle between two states."""
+        state = self.state(vector)
+        step = self.configuration.to_local(trial) - state.q
+        largest = max((term.largest_turn(state, step) for term in self.terms), default=0.0)
+        return self.configuration.comm.allreduce(largest, op=MPI.MAX)
 
     def accept(self, vector: PETSc.Vec) -> None:
         """Adopt a converged state (branches of the angles)."""

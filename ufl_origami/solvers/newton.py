@@ -79,6 +79,7 @@ class NewtonSolver:
     Attributes:
         shift: last diagonal shift over the weights, 0 before the first one.
         report: what the solve under way did so far.
+        allowed: negative pivots that the guard leaves alone (to follow an unstable branch).
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class NewtonSolver:
         self.problem, self.settings = problem, settings or NewtonSettings()
         self.prefix, self.options = prefix, dict(options or {})
         self.report = NewtonReport()
+        self.allowed = 0
         self._residual_vector = problem.configuration.create_vector()
         self._previous: PETSc.Vec | None = None
         self._mip = self._guard = self.settings.method == "default"
@@ -166,7 +168,7 @@ class NewtonSolver:
         """
         linear = Factorisation(ksp, self.problem.tangent.matrix, self.problem.symmetric)
         found = linear.factor()
-        if self._guard and found:
+        if self._guard and found and found > self.allowed:
             self._raise_shift(linear)
         self.report.factorisations += linear.count
         return found

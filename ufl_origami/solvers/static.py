@@ -3,7 +3,9 @@
 Each step starts from the tangent predictor (prescribed motion enters through the tangent's
 columns, never by moving boundary vertices alone) and is corrected by Newton. The step grows while
 Newton is easy, is cut when it fails or ends at an inadmissible state, and the path gives up with a
-clear error at the smallest step. Each accepted state knows the inertia of its own tangent.
+clear error at the smallest step. Each accepted state knows the inertia of its own tangent. From an
+unstable one the guard first looks for a stable neighbour; where that fails, the unstable branch is
+followed, and every state on it is reported.
 """
 
 import logging
@@ -14,6 +16,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from petsc4py import PETSc
+
+import numpy as np
 
 from ufl_origami.errors import InputError, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
@@ -30,6 +34,8 @@ class StepSettings:
         first: first step.
         largest: largest step.
         smallest: a step below this is given up.
+        turn: a predicted change (radians) of a fold angle or loaded edge from which on the step is
+            cut before it is tried: beyond half a turn its branch would be a guess.
         growth: factor after an easy step.
         easy: Newton iterations up to which a step is easy.
     """
@@ -37,6 +43,7 @@ class StepSettings:
     first: float = 0.125
     largest: float = 1.0
     smallest: float = 1e-5
+    turn: float = np.pi
     growth: float = 1.5
     easy: int = 9
 
@@ -96,6 +103,7 @@ class StaticPath:
     check: Check | None = None
     steps: list[Step] = field(default_factory=list)
     size: float | None = None
+    _unstable: int = 0
 
     def run(
         self, x: PETSc.Vec, start: float, stops: Sequence[float], on_accept: OnAccept | None = None
@@ -115,7 +123,7 @@ class StaticPath:
         if any(later <= earlier for earlier, later in pairwise(stops)):
             raise InputError(f"stops {list(stops)} do not increase")
         time, size = start, self.size or self.settings.first
-        self._factor_at(x, time)
+        self._unstable = self._factor_at(x, time) or 0
         for stop in stops:
             while time < stop - 1e-12 * max(1.0, abs(stop)):
                 target = stop if time + 1.001 * size >= stop else time + size
@@ -147,11 +155,14 @@ class StaticPath:
             trial, report = self._try(x, time, target)
             iterations += report.iterations
             factorisations += report.factorisations
-            why = "" if report.converged else report.reason
-            if report.converged and self.check:
-                why = self.check(trial)
+            why = self._refusal(trial, report)
             if not why:
                 break
+            if self._unstable and not self.newton.allowed:
+                log.info("step to %g failed (%s), follow the unstable branch", target, why)
+                self.newton.allowed = self._unstable
+                self._factor_at(x, time)
+                continue
             size = 0.5 * (target - time)
             log.info("step to %g failed (%s), cut to %g", target, why, size)
             if size < self.settings.smallest:
@@ -163,7 +174,9 @@ class StaticPath:
         trial.copy(x)
         self.problem.accept(x)
         self.newton.report = NewtonReport()
+        self.newton.allowed = 0
         negative = self._factor_at(x, target)
+        self._unstable = negative or 0
         step = Step(
             number=len(self.steps) + 1,
             time=target,
@@ -181,10 +194,20 @@ class StaticPath:
             warnings.warn(text, StabilityWarning, stacklevel=3)
         return step
 
+    def _refusal(self, trial: PETSc.Vec, report: NewtonReport) -> str:
+        """Why a trial cannot be accepted, or an empty string."""
+        if not report.converged:
+            return report.reason
+        return self.check(trial) if self.check else ""
+
     def _try(self, x: PETSc.Vec, time: float, target: float) -> tuple[PETSc.Vec, NewtonReport]:
         """Predictor and Newton from an accepted state whose tangent is factored."""
         self.newton.report = NewtonReport(iterations=1)
         trial = self._predict(x, target)
+        turn = self.problem.largest_turn(x, trial)
+        if turn >= self.settings.turn:
+            self.newton.report.reason = f"an angle would turn by {np.degrees(turn):.0f} deg"
+            return trial, self.newton.report
         return trial, self.newton.solve(trial, x)
 
     def _predict(self, x: PETSc.Vec, target: float) -> PETSc.Vec:

@@ -58,6 +58,15 @@ class Term(ABC):
             current: the iterate at which the tangent will be formed.
         """
 
+    def largest_turn(self, state: State, step: np.ndarray) -> float:
+        """Largest change (radians) to first order of this rank's unwrapped angles over a step.
+
+        Args:
+            state: where the step starts.
+            step: increments of the unknowns (num_local,).
+        """
+        return 0.0
+
     def accept(self, state: State) -> None:
         """Adopt a converged state as the branch against which angles are unwrapped."""
 

@@ -150,6 +150,11 @@ class CreaseTerm(StencilTerm):
         used = self._dofs >= 0
         np.add.at(out, self._dofs[used], moment[used])
 
+    def largest_turn(self, state: State, step: np.ndarray) -> float:
+        """Largest change (radians) of the virtual fold angles over a step."""
+        change = np.where(self._dofs >= 0, step[self._dofs], 0.0) * self.edges.coefficient
+        return float(np.abs(change.sum(axis=1)).max(initial=0.0))
+
     def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
         """Write the rotational stiffness of each edge."""
         k = self.edges.coefficient

@@ -163,6 +163,12 @@ class EdgeMoment(StencilTerm):
         """Write the Hessians of the rotation times the moment."""
         kernels.hinge_work_hessian(state.x, self._hinge, self._work(), blocks[0])
 
+    def largest_turn(self, state: State, step: np.ndarray) -> float:
+        """Largest linear change (radians) of the boundary's rotation over a step."""
+        turn = np.zeros(self._dofs.shape)
+        kernels.hinge_work_gradient(state.x, self._hinge, np.ones(len(turn)), turn)
+        return float(np.abs((turn * step[self._dofs]).sum(axis=1)).max(initial=0.0))
+
     def accept(self, state: State) -> None:
         """Unwrap the rotation against this state from now on."""
         self._ref[:] = self._angles(state)
