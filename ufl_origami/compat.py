@@ -1,10 +1,17 @@
 """The one module that knows the dolfinx version (0.9 and later)."""
 
+import logging
+
 import dolfinx
 import numpy as np
 from dolfinx import cpp, fem
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+
+# ffcx, which dolfinx imports, hands all warnings of the process to a logger; in a program that has
+# set up no logging they would vanish there.
+if not logging.getLogger().handlers:
+    logging.captureWarnings(False)
 
 
 def constants_and_coefficients(form: fem.Form):
