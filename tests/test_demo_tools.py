@@ -12,6 +12,7 @@ from scenes import build, follow, z_fold_scene
 
 from ufl_origami.demo import print_table, read_options, write_summary
 from ufl_origami.gather import gather_fold_angles, gather_profile, gather_sheet
+from ufl_origami.run import solve_static
 
 REPO = Path(__file__).resolve().parent.parent
 DEFAULTS = {"model": "ddg", "bending": ("director", "averaged"), "eta": (0.1, 1.0), "h": 0.01}
@@ -121,6 +122,20 @@ def test_gathered_fold_angles_are_ordered_and_have_the_mean(pulled, comm):
     mean = np.average(angles.virtual, weights=angles.length)
     assert mean == pytest.approx(pulled.mean_fold_angle("crease"), rel=1e-12)
     assert len(set(comm.allgather(angles.virtual.tobytes()))) == 1
+
+
+@pytest.mark.mpi
+def test_on_accept_sees_each_step_in_its_state():
+    seen = []
+    model = build(z_fold_scene(0.25, 0.5))
+    result = solve_static(
+        model,
+        [0.25, 0.5],
+        on_accept=lambda step, m: seen.append((step, m.problem.time, m.reaction("right_edge")[0])),
+    )
+    assert [step for step, *_ in seen] == result.steps
+    assert [time for _, time, _ in seen] == [step.time for step in result.steps]
+    assert [force for *_, force in seen] == list(result.history["reaction_right_edge_x"])
 
 
 FAILING = """

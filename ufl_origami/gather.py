@@ -1,11 +1,27 @@
 """A distributed model's arrays on rank 0, in the order of the input: for figures and tables."""
 
+from dataclasses import dataclass
+
 from mpi4py import MPI
 
 import numpy as np
 
 from ufl_origami.model import FoldAngles, Model, place_vertices
-from ufl_origami.plotting import Sheet
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A sheet's current shape, as the pictures of `plotting` take it.
+
+    Attributes:
+        points: vertices (n, 3).
+        triangles: vertex indices (m, 3).
+        crease_edges: vertex pairs (k, 2).
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    crease_edges: np.ndarray
 
 
 def gather_rows(comm: MPI.Comm, rows: np.ndarray) -> np.ndarray | None:
@@ -14,7 +30,7 @@ def gather_rows(comm: MPI.Comm, rows: np.ndarray) -> np.ndarray | None:
     return None if parts is None else np.concatenate(parts)
 
 
-def gather_sheet(model: Model) -> Sheet | None:
+def gather_sheet(model: Model) -> Shape | None:
     """Current shape with its creases, ready to draw, on rank 0; collective."""
     sheet = model.sheet
     n, nc, ne = sheet.num_owned_vertices, sheet.num_owned_cells, sheet.num_owned_edges
@@ -24,11 +40,11 @@ def gather_sheet(model: Model) -> Sheet | None:
     points = gather_rows(sheet.comm, model.state.x[:n])
     triangles = gather_rows(sheet.comm, sheet.input_vertex[sheet.cells[:nc]])
     creases = gather_rows(sheet.comm, sheet.input_vertex[ends])
-    if places is None or points is None or triangles is None:
+    if places is None or points is None or triangles is None or creases is None:
         return None
     ordered = np.empty_like(points)
     ordered[places] = points
-    return Sheet(ordered, triangles, crease_edges=creases)
+    return Shape(ordered, triangles, creases)
 
 
 def gather_profile(model: Model, name: str) -> tuple[np.ndarray, np.ndarray] | None:

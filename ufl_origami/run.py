@@ -9,7 +9,7 @@ In the output folder:
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +61,7 @@ def solve_static(
     newton: NewtonSettings | None = None,
     resume: bool = False,
     progress: bool | None = None,
+    on_accept: Callable[[Step, Model], None] | None = None,
 ) -> StaticResult:
     """Follow the equilibrium of a scene over the load factor; collective.
 
@@ -77,6 +78,8 @@ def solve_static(
         resume: continue the run in `output` from its last accepted step, on any number of ranks;
             on one rank, with the settings it had, to the same bits.
         progress: show a progress bar; None: where the error stream is a terminal.
+        on_accept: called on all ranks with each accepted step and the model in its state, after
+            history, fields and checkpoint are written.
 
     Raises:
         SolveError: a step below the smallest size failed; all accepted steps are on disk and the
@@ -101,13 +104,15 @@ def solve_static(
         bar = stack.enter_context(closing(_ProgressBar(model, stops, progress)))
         request = stack.enter_context(InterruptRequest())
 
-        def on_accept(step: Step, x: PETSc.Vec) -> None:
+        def accept(step: Step, x: PETSc.Vec) -> None:
             for observe in [*observers, bar.observe]:
                 observe(step)
+            if on_accept:
+                on_accept(step, model)
             if request.agreed(model.sheet.comm):
                 raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
 
-        path.run(model.x, model.problem.time, stops, on_accept)
+        path.run(model.x, model.problem.time, stops, accept)
     return StaticResult(model, path.steps, log.history)
 
 
