@@ -5,9 +5,11 @@ returns its path. Figures are made without pyplot and with local settings, so th
 matplotlib's global state changes. Call on one rank only.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any, Literal
 
@@ -88,7 +90,9 @@ def profile_chart(
     wide, high = (np.ptp(np.concatenate([np.asarray(getattr(s, a)) for s in every])) for a in "xy")
     width = max(2.5, 6.2 / len(panels))
     height = min(max(0.9 * width * high / wide, 1.0), 6.0) if wide > 0 else 3.0
-    with _figure(file, (width * len(panels) + 0.4, height + 1.2)) as (figure, path):
+    wide, labels_of = width * len(panels) + 0.4, {series.label for series in every}
+    legend = ceil(len(labels_of) / _legend_columns(labels_of, wide))
+    with _figure(file, (wide, height + 0.8 + 0.2 * legend)) as (figure, path):
         row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
         for axes, (title, group) in zip(row, panels.items(), strict=True):
             _draw(axes, group, every)
@@ -249,8 +253,15 @@ def _legend(figure: Figure, axes: Sequence[Any]) -> None:
     for one in axes:
         for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    columns = min(len(entries), 3 if max(map(len, entries)) > 18 else 4)
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns or 1)
+    columns = _legend_columns(entries, figure.get_figwidth())
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
+
+
+def _legend_columns(labels: Iterable[str], width: float) -> int:
+    """Columns of a legend that fit into a width in inches, at most four."""
+    plain = [re.sub(r"\\[a-z]+|[${}\\]", "", label) for label in labels]
+    longest = max(map(len, plain), default=0)
+    return max(1, min(len(plain), 4, int(width / (0.65 + 0.065 * longest))))
 
 
 def _with_order(series: Series) -> Series:
