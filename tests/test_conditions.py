@@ -5,7 +5,7 @@ from petsc4py import PETSc
 import numpy as np
 import pytest
 from dolfinx import cpp
-from scenes import E, H, build, follow, strip_scene, z_fold_scene
+from scenes import E, H, build, follow, strip_scene, tee, z_fold_scene
 
 from ufl_origami.errors import InputError, SceneError
 from ufl_origami.material import Material
@@ -18,6 +18,7 @@ from ufl_origami.terms.crease import LinearLaw
 pytestmark = pytest.mark.mpi
 
 EI = E * H**3 / 12
+PANELS = ("left", "right", "upright")
 
 
 def two_panels(comm, n=3, *, turned=False, partitioner=None):
@@ -150,3 +151,42 @@ def test_a_crease_with_a_doubtful_rest_angle_is_refused(given, match):
 def test_stops_that_do_not_increase_are_refused():
     with pytest.raises(InputError, match="do not increase"):
         follow(build(z_fold_scene(0.4, 0.3)), (1.0, 0.5))
+
+
+def test_a_condition_with_values_for_other_vertices_is_refused():
+    scene = strip_scene((4, 1))
+    scene.move("x1", z=lambda time: time * np.arange(50))
+    with pytest.raises(SceneError, match=r"values of shape \(50,\)"):
+        follow(build(scene))
+
+
+@pytest.mark.parametrize("bending", ["director", "averaged"])
+def test_contradictory_conditions_on_an_edge_are_refused(bending):
+    scene = strip_scene((4, 1), bending=bending)
+    scene.edge_moment("x0", 1.0)
+    with pytest.raises(SceneError, match="edge moment 'x0': the edge is clamped"):
+        build(scene)
+    scene = strip_scene((4, 1), bending=bending)
+    scene.clamp("boundary")
+    with pytest.raises(SceneError, match="clamped more than once"):
+        build(scene)
+
+
+PAIRS = [(a, b) for a in PANELS for b in PANELS if a != b]
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_fold_angles_are_those_of_the_declared_pair(comm, pair):
+    scene = Scene(tee(comm), Material(E, 0.0, H))
+    scene.crease("spine", 1.0, pair=pair)
+    model = build(scene)
+    angles = model.fold_angles("spine")
+    flat = set(pair) == {"left", "right"}
+    assert np.abs(angles.mesh) == pytest.approx(0.0 if flat else 0.5 * np.pi, abs=1e-12)
+    assert angles.virtual == pytest.approx(angles.mesh, abs=1e-12)
+
+
+def test_a_spring_between_a_panel_and_itself_is_refused(comm):
+    scene = Scene(tee(comm), Material(E, 0.0, H))
+    with pytest.raises(SceneError, match="no two panels"):
+        scene.crease("spine", 1.0, pair=("left", "left"))

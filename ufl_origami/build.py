@@ -90,12 +90,16 @@ def clamped_facets(scene: Scene, sides: EdgeSides) -> np.ndarray:
         for clamp, part in zip(scene.clamps, facets, strict=True):
             if (count[part] > 1).any():
                 raise SceneError(f"clamp {clamp.name!r}: an edge of two triangles is no boundary")
-    return np.unique(np.concatenate(facets))
+        every, times = np.unique(np.concatenate(facets), return_counts=True)
+        if (times > 1).any():
+            names = [clamp.name for clamp in scene.clamps]
+            raise SceneError(f"an edge is clamped more than once by {names}")
+    return every
 
 
 def rest_fold_angles(sheet: SheetMesh, fan: EdgeFan) -> np.ndarray:
     """Fold angles (n, m - 1) of the rest shape between side 0 and each other side."""
-    angles = [mesh_angles(sheet, fan, k, sheet.rest) for k in range(1, len(fan.panels))]
+    angles = [mesh_angles(sheet, fan, (0, k), sheet.rest) for k in range(1, len(fan.panels))]
     return np.stack(angles, axis=1)
 
 
@@ -232,17 +236,17 @@ def edge_moment(
     sheet = scene.sheet
     facets = sheet.edge_facets(spec.name)
     owned = np.flatnonzero(np.isin(sides.facet[: 3 * sheet.num_owned_cells], facets))
+    clamped = clamped_facets(scene, sides)
     with together(sheet.comm):
         if (sides.count[owned] > 1).any():
             raise SceneError(f"edge moment {spec.name!r}: an edge of two triangles is no boundary")
+        if np.isin(sides.facet[owned], clamped).any():
+            raise SceneError(f"edge moment {spec.name!r}: the edge is clamped")
     ends = side_ends(sheet, owned)
     verts = np.column_stack([ends, sheet.cells.ravel()[owned], ends[:, 0]]).astype(np.int32)
     slots = np.zeros((len(owned), 0), dtype=np.int32)
     if scene.bending == "director":
         slots = configuration.slot(DIRECTOR)[sides.facet[owned]][:, None]
-        with together(sheet.comm):
-            if (slots < 0).any():
-                raise SceneError(f"edge moment {spec.name!r}: the edge is clamped")
     n = len(owned)
     hinge = kernels.HingeStencil(
         verts,

@@ -21,6 +21,7 @@ class Constraints:
     def __init__(self, configuration: Configuration):
         self.configuration = configuration
         self._parts: list[tuple[np.ndarray, np.ndarray, Values, str]] = []
+        self._counts: list[int] = []
         self.dofs = np.empty(0, dtype=np.int64)
 
     def add(self, local: np.ndarray, values: Values, label: str) -> None:
@@ -34,6 +35,7 @@ class Constraints:
         position = self.configuration.global_ids[local] - self.configuration.offset
         owned = np.flatnonzero((position >= 0) & (position < self.configuration.size_local))
         self._parts.append((position[owned], owned, values, label))
+        self._counts.append(len(position))
         self.dofs = np.unique(np.concatenate([self.dofs, position[owned]])).astype(np.int64)
 
     def values(self, time: float) -> np.ndarray:
@@ -47,12 +49,20 @@ class Constraints:
         """Refuse values at a load factor or time that no state can have; collective.
 
         Raises:
-            SceneError: on all ranks, when two conditions prescribe different values or a value is
-                not finite.
+            SceneError: on all ranks, when two conditions prescribe different values, a value is
+                not finite, or a function gives neither one value nor one a vertex.
         """
         with together(self.configuration.comm):
             result = np.full(len(self.dofs), np.nan)
-            for position, owned, values, label in self._parts:
+            for (position, owned, values, label), count in zip(
+                self._parts, self._counts, strict=True
+            ):
+                shape = np.shape(values(time))
+                if shape not in ((), (count,)):
+                    raise SceneError(
+                        f"condition {label!r} at {time:g}: values of shape {shape} for {count} "
+                        "vertices; give one number or one for each"
+                    )
                 given = _entries(values(time), owned)
                 if not np.isfinite(given).all():
                     raise SceneError(f"condition {label!r} at {time:g}: value is not finite")

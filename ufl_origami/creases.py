@@ -70,16 +70,32 @@ def side_ends(sheet: SheetMesh, sides: np.ndarray) -> np.ndarray:
     return np.stack([sheet.cells[cell, (e + 1) % 3], sheet.cells[cell, (e + 2) % 3]], axis=-1)
 
 
-def mesh_angles(sheet: SheetMesh, fan: EdgeFan, k: int, x: np.ndarray) -> np.ndarray:
-    """Dihedral fold angles (n,) between the triangles of side 0 and side k at positions x."""
+def mesh_angles(
+    sheet: SheetMesh,
+    fan: EdgeFan,
+    pair: tuple[int, int],
+    x: np.ndarray,
+    near: np.ndarray | None = None,
+) -> np.ndarray:
+    """Dihedral fold angles of the triangles on two sides of a crease's edges.
+
+    Args:
+        sheet: the meshed sheet.
+        fan: edges of the crease.
+        pair: positions of the two sides; the first one's orientation counts.
+        x: positions (nv, 3).
+        near: angles (n,) by which the branch is chosen (radians), None: within half a turn.
+
+    Returns:
+        Angles (n,) in radians, valley positive.
+    """
     opposite = sheet.cells.ravel()
-    ends = side_ends(sheet, fan.sides[:, 0])
-    verts = np.column_stack([ends, opposite[fan.sides[:, 0]], opposite[fan.sides[:, k]]])
+    first, second = (fan.sides[:, side] for side in pair)
+    verts = np.column_stack([side_ends(sheet, first), opposite[first], opposite[second]])
     n = len(verts)
-    angle = np.zeros(n)
-    kernels.hinge_angles(
-        x, np.ascontiguousarray(verts, dtype=np.int32), np.zeros((n, 3)), np.zeros(n), angle
-    )
+    angle, near = np.zeros(n), np.zeros(n) if near is None else near
+    verts = np.ascontiguousarray(verts, dtype=np.int32)
+    kernels.hinge_angles(x, verts, np.zeros((n, 3)), near, angle)
     return angle
 
 

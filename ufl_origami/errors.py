@@ -42,4 +42,4 @@ class StabilityWarning(UserWarning):
 
 
 class SupportWarning(UserWarning):
-    """A piece of the sheet that no condition keeps from turning: the tangent at rest is singular."""
+    """A piece of the sheet that no condition keeps from turning: a singular tangent at rest."""

@@ -77,14 +77,17 @@ class Model:
         return self.configuration.sum(positions[vertex] if mine else np.zeros(3))
 
     def fold_angles(self, name: str) -> "FoldAngles":
-        """Virtual and mesh fold angles along this rank's share of a crease."""
+        """Virtual and mesh fold angles along this rank's share of a crease.
+
+        They are those between the panels of the crease's first declared spring.
+        """
         crease = self.creases[name]
         state, fan = self.state, crease.fan
         ends = self.sheet.edge_vertices()[fan.facets]
-        k = max(crease.sides)
-        mesh = mesh_angles(self.sheet, fan, k, state.x) if len(fan.facets) else np.zeros(0)
+        virtual = crease.spring.angle(state.scalars)
+        mesh = mesh_angles(self.sheet, fan, crease.sides, state.x, virtual)
         middle = self.sheet.rest[ends].mean(axis=1)
-        return FoldAngles(middle, fan.length, crease.spring.angle(state.scalars), mesh)
+        return FoldAngles(middle, fan.length, virtual, mesh)
 
     def mean_fold_angle(self, name: str) -> float:
         """Length-weighted mean of the virtual fold angle of a crease (radians)."""

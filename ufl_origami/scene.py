@@ -192,6 +192,8 @@ class Scene:
             raise SceneError(f"crease {name!r}: rest angle {rest_angle} is no angle in radians")
         for panel in pair or ():
             self.sheet.panel_cells(panel)
+        if pair is not None and len(set(pair)) != 2:
+            raise SceneError(f"crease {name!r}: {pair} are no two panels")
         self.creases.append(
             CreaseSpec(name, law, 0.0 if stiffness is None else stiffness, rest_angle, pair)
         )
