@@ -26,6 +26,8 @@ from ufl_origami.run import solve_static
 from ufl_origami.solvers.admissible import Admissible, Limits
 from ufl_origami.solvers.static import StepSettings
 
+pytestmark = pytest.mark.filterwarnings("ignore:sagitta/h:ufl_origami.errors.MeshWarning")
+
 ROOT = Path(__file__).parents[1]
 
 

@@ -137,7 +137,7 @@ def test_inertia_equals_the_signs_of_the_eigenvalues():
 
 def test_options_under_the_prefix_reach_the_solver_and_leave_no_trace():
     model = build(z_fold_scene(0.4, 0.3, d1=0.2))
-    solver = NewtonSolver(model.problem, prefix="mine_", options={"pc_type": "lu"})
+    solver = NewtonSolver(model.problem, NewtonSettings(prefix="mine_", options={"pc_type": "lu"}))
     path = StaticPath(model.problem, solver, StepSettings())
     path.run(model.x, 0.0, [1.0])
     assert solver.linear.ksp.pc.getType() == "lu"

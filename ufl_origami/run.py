@@ -26,10 +26,12 @@ from ufl_origami.history import CsvFile, History, Record, Recorder, Row, read_hi
 from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model
 from ufl_origami.output import FieldWriter
+from ufl_origami.quality import warn_sagitta
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.newton import SHIFT_FACTOR, NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, Step, StepSettings
+from ufl_origami.supports import check_supports
 
 HISTORY_FILE = "history.csv"
 CHECKPOINT_FOLDER = "checkpoint"
@@ -88,10 +90,17 @@ def solve_static(
         InputError: scene or record are incomplete or wrong, or there is no run of this scene to
             resume.
         OSError: a file could not be written.
+
+    Warns:
+        SupportWarning: a piece of the sheet may turn freely.
+        MeshWarning: the mesh cannot represent the form, or the curvature that was found.
+        StabilityWarning: an accepted state is unstable.
     """
     if resume and output is None:
         raise InputError("resume: name the output folder of the run to resume")
     model = scene if isinstance(scene, Model) else build(scene)
+    if not model.scene.terms:  # a term of the user's own may hold the sheet as well
+        check_supports(model)
     solver = NewtonSolver(model.problem, newton or NewtonSettings())
     path = StaticPath(model.problem, solver, steps or StepSettings(), Admissible(model))
     log = _Log(model, record or Record())
@@ -113,6 +122,7 @@ def solve_static(
                 raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
 
         path.run(model.x, model.problem.time, stops, accept)
+    warn_sagitta(model)
     return StaticResult(model, path.steps, log.history)
 
 

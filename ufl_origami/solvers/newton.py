@@ -39,6 +39,8 @@ class NewtonSettings:
         iterations: full steps in one run.
         cycles: runs of the watchdog, each with twice the line-search steps of the one before.
         floor: tolerance floor in units of eps max K_ii max |x|.
+        prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
+        options: PETSc options under that prefix; those in the database already win.
     """
 
     method: str = "default"
@@ -46,6 +48,8 @@ class NewtonSettings:
     iterations: int = 12
     cycles: int = 4
     floor: float = 30.0
+    prefix: str = "ufl_origami_"
+    options: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass
@@ -72,9 +76,7 @@ class NewtonSolver:
 
     Args:
         problem: terms and constraints.
-        settings: method and tolerances.
-        prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
-        options: PETSc options under that prefix.
+        settings: method, tolerances and PETSc options.
 
     Attributes:
         shift: last diagonal shift over the weights, 0 before the first one.
@@ -82,15 +84,8 @@ class NewtonSolver:
         allowed: negative pivots that the guard leaves alone (to follow an unstable branch).
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        settings: NewtonSettings | None = None,
-        prefix: str = "ufl_origami_",
-        options: Mapping[str, object] | None = None,
-    ):
+    def __init__(self, problem: Problem, settings: NewtonSettings | None = None):
         self.problem, self.settings = problem, settings or NewtonSettings()
-        self.prefix, self.options = prefix, dict(options or {})
         self.report = NewtonReport()
         self.allowed = 0
         self._residual_vector = problem.configuration.create_vector()
@@ -106,7 +101,7 @@ class NewtonSolver:
     def _create_snes(self, line_search: str) -> PETSc.SNES:
         matrix = self.problem.tangent.matrix
         snes = PETSc.SNES().create(matrix.comm)
-        snes.setOptionsPrefix(self.prefix)
+        snes.setOptionsPrefix(self.settings.prefix)
         snes.setFunction(self._function, self._residual_vector.duplicate())
         snes.setJacobian(self._jacobian, matrix, matrix)
         snes.setConvergenceTest(self._converged)
@@ -127,7 +122,7 @@ class NewtonSolver:
             "snes_divergence_tolerance": 1e30,
             **linear_options(self.problem.symmetric),
         }
-        return option_scope(self.prefix, {**defaults, **self.options})
+        return option_scope(self.settings.prefix, {**defaults, **self.settings.options})
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
         self.problem.residual(x, out)
