@@ -140,7 +140,8 @@ def displacement(model: Model, point: str) -> np.ndarray:
     """Displacement (3,) of a named point (collective)."""
     vertex = model.sheet.point_vertex(point)
     mine = 0 <= vertex < model.configuration.nv_owned
-    moved = model.state.x[vertex] - model.sheet.rest[vertex] if mine else np.zeros(3)
+    positions = model.state.x
+    moved = positions[vertex] - model.sheet.rest[vertex] if mine else np.zeros(3)
     return model.configuration.sum(moved)
 
 
