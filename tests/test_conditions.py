@@ -190,3 +190,34 @@ def test_a_spring_between_a_panel_and_itself_is_refused(comm):
     scene = Scene(tee(comm), Material(E, 0.0, H))
     with pytest.raises(SceneError, match="no two panels"):
         scene.crease("spine", 1.0, pair=("left", "left"))
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_a_rest_angle_counts_in_the_orientation_of_the_first_panel(comm, pair):
+    scene = Scene(tee(comm, 2), Material(E, 0.0, H))
+    third = next(panel for panel in PANELS if panel not in pair)
+    scene.crease("spine", EI, pair=pair, rest_angle=lambda time: start[pair] + 0.4 * time)
+    scene.crease("spine", EI, pair=(pair[0], third))
+    scene.fix(pair[0])
+    start = {pair: rest_angle(scene, pair)}
+    model = build(scene)
+    follow(model)
+    angles = model.fold_angles("spine")
+    assert angles.mesh == pytest.approx(start[pair] + 0.4, abs=1e-7)
+    assert sum(model.energies().values()) < 1e-12 * EI
+
+
+def rest_angle(scene, pair):
+    """Fold angle of two panels of a tee from their directions and the first one's normal."""
+    sheet, directions = (
+        scene.sheet,
+        dict(zip(PANELS, ([-1, 0, 0], [1, 0, 0], [0, 0, 1]), strict=True)),
+    )
+    cells = np.flatnonzero(sheet.cell_panel[: sheet.num_owned_cells] == PANELS.index(pair[0]))
+    normal = np.zeros(3)
+    if len(cells):
+        a, b, c = sheet.rest[sheet.cells[cells[0]]]
+        normal = np.cross(b - a, c - a)
+    normal = np.sign(sum(sheet.comm.allgather(normal)))
+    first, second = (np.array(directions[panel]) for panel in pair)
+    return float(np.arctan2(second @ normal, -(second @ first)))

@@ -93,6 +93,18 @@ def test_a_refused_state_is_cut_down_to_the_smallest_step_and_raises():
 
 
 @pytest.mark.mpi
+def test_the_watchdog_carries_starved_full_steps_to_the_same_equilibrium():
+    angles = []
+    for iterations in (12, 1):
+        model = build(z_fold_scene(0.25, 0.1))
+        path = follow(model, first=0.5, newton=NewtonSettings(iterations=iterations))
+        assert all(step.cuts == 0 for step in path.steps)
+        angles.append(model.mean_fold_angle("crease"))
+    assert sum(step.iterations for step in path.steps) > 2 * len(path.steps)
+    assert angles[1] == pytest.approx(angles[0], abs=1e-9)
+
+
+@pytest.mark.mpi
 def test_an_unreachable_tolerance_is_no_convergence():
     model = build(z_fold_scene(0.25, 0.1))
     settings = NewtonSettings(rtol=0.0, floor=0.0, iterations=5, cycles=2)

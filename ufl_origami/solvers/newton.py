@@ -229,6 +229,7 @@ class NewtonSolver:
             start.copy(x)
         if self._careful is None:
             self._careful = self._create_snes("bt")
+            self._careful.setKSP(self.linear.ksp)  # one factor in memory, not two
         self._mip = False
         try:
             done = self._run(self._careful, x, iterations)

@@ -221,9 +221,11 @@ class StaticPath:
         rhs.scale(-1.0)
         dofs = problem.constraints.dofs
         known.set(0.0)
-        known.array_w[dofs] = problem.constraints.values(target) - x.array_r[dofs]
+        values = problem.constraints.values(target)
+        known.array_w[dofs] = values - x.array_r[dofs]
         problem.constrain(matrix, known, rhs)
         step = x.duplicate()
         self.newton.linear.solve(rhs, step)
         step.axpy(1.0, x)
+        step.array_w[dofs] = values  # to the last digit: the residual's norm mixes units
         return step
