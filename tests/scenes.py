@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ufl_origami.build import build
+from ufl_origami.discretise import build
 from ufl_origami.gallery import z_fold
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle

@@ -221,3 +221,12 @@ def rest_angle(scene, pair):
     normal = np.sign(sum(sheet.comm.allgather(normal)))
     first, second = (np.array(directions[panel]) for panel in pair)
     return float(np.arctan2(second @ normal, -(second @ first)))
+
+
+def test_a_name_of_two_places_is_refused(comm):
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], dtype=float)
+    sheet = sheet_from_arrays(
+        comm, vertices, np.array([(0, 1, 2)]), panel_names=["left"], edges={"left": [(0, 2)]}
+    )
+    with pytest.raises(SceneError, match="'left' names several places .panel, edge set."):
+        Scene(sheet, Material(E, 0.3, H)).fix("left")

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import ufl_origami as uo
@@ -78,7 +77,7 @@ def test_example_of_an_own_term_runs_as_it_stands(tmp_path):
 def test_warnings_reach_a_script_that_set_up_no_logging(tmp_path):
     script = (
         "import ufl_origami as uo\n"
-        "from ufl_origami.build import build\n"
+        "from ufl_origami.discretise import build\n"
         "sheet = uo.mesh_pattern(uo.gallery.z_fold(), 0.5, structure='crisscross')\n"
         "scene = uo.Scene(sheet, uo.Material(1e7, 0.0, 0.01), bending='averaged')\n"
         "scene.crease('crease', 1.0)\n"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ufl_origami.build import build
+from ufl_origami.discretise import build
 from ufl_origami.gallery.shell_problems import Form, cantilever_shear
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, StepSettings

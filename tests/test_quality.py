@@ -2,15 +2,17 @@
 
 import warnings
 
+from mpi4py import MPI
+
 import numpy as np
 import pytest
 
 from ufl_origami import kernels
-from ufl_origami.build import build
+from ufl_origami.discretise import build
 from ufl_origami.errors import MeshWarning, SceneError, SupportWarning
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
-from ufl_origami.patch_check import interior_cells, patch_errors
+from ufl_origami.patch_check import curvature_maps, interior_cells, patch_errors, tangent_frames
 from ufl_origami.quality import (
     LONG_EDGE,
     check_mesh,
@@ -146,8 +148,6 @@ def test_patch_check_is_the_shells_own_energy(comm, curvature):
 
 
 def _predicted_error(sheet, inside, k):
-    from ufl_origami.patch_check import curvature_maps, tangent_frames
-
     maps = curvature_maps(sheet, edge_sides(sheet), inside)
     frames = tangent_frames(sheet)[inside][:, :, :2]
     local = np.einsum("nai,ij,nbj->nab", frames, k, frames)
@@ -172,6 +172,27 @@ def test_unstructured_meshes_pass_only_when_fine(comm):
     fine = errors_of(rectangle(1.0, 1.0, 40, structure="unstructured", comm=comm)).worst[0]
     assert 0 < fine < 0.02
     assert fine < coarse < 0.3
+
+
+@pytest.mark.mpi
+def test_figures_do_not_depend_on_the_ranks(comm):
+    """Each rank also meshes the whole sheet alone."""
+    figures = []
+    for on in (comm, MPI.COMM_SELF):
+        sheet = rectangle(1.0, 1.0, 8, structure="unstructured", comm=on)
+        model = build(Scene(sheet, Material(1e6, NU, 1e-4)))
+        x, y, _ = sheet.rest[: model.configuration.nv_owned].T
+        shift = np.stack([0 * x, 0 * x, 0.1 * np.sin(3 * x) * y**2], axis=1)
+        model.x.array_w[: shift.size] = shift.ravel()
+        worst, share = sagitta(model)
+        stretched = rectangle(1.0, 2.0, (48, 5), comm=on)
+        errors = errors_of(sheet)
+        figures.append(
+            [errors.worst[0], errors.cylinder[0], worst.value, *worst.place, worst.cell, share]
+            + [finding.figure for finding in check_mesh(Scene(stretched, STEEL))]
+        )
+    assert len(figures[0]) == 9
+    assert figures[0] == pytest.approx(figures[1], rel=1e-9)
 
 
 @pytest.mark.mpi
@@ -231,7 +252,7 @@ def _altitude(vertices, triangles):
 
 def deflection(sheet, nu):
     """Deflection of a cantilever plate under a small end shear over the beam's, less one."""
-    length, h = sheet.comm.allreduce(sheet.rest[:, 0].max(initial=0.0), op=_max()), 0.05
+    length, h = sheet.comm.allreduce(sheet.rest[:, 0].max(initial=0.0), op=MPI.MAX), 0.05
     scene = Scene(sheet, Material(12 / h**3, nu, h))
     scene.fix("x0")
     scene.clamp("x0")
@@ -241,12 +262,6 @@ def deflection(sheet, nu):
         model.x, 0.0, [1.0]
     )
     return model.position("x1_mid")[2] / (1e-6 * length**3 / 3) - 1
-
-
-def _max():
-    from mpi4py import MPI
-
-    return MPI.MAX
 
 
 @pytest.mark.parametrize("along", [4, 2])

@@ -16,7 +16,7 @@ import pytest
 from run_scenes import PULL_STEPS, AtStep, crush, interrupt, pull, roll, run_pull, squeeze
 
 import ufl_origami
-from ufl_origami.build import build
+from ufl_origami.discretise import build
 from ufl_origami.errors import InputError, SolveError
 from ufl_origami.gallery import z_fold
 from ufl_origami.history import STEP_COLUMNS, Record, read_history

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ufl_origami.analytic.reference_tables import read_table
-from ufl_origami.build import build
+from ufl_origami.discretise import build
 from ufl_origami.errors import MeshWarning
 from ufl_origami.gallery.shell_problems import Form, cantilever_moment, cantilever_shear
 from ufl_origami.solvers.newton import NewtonSolver

@@ -1,7 +1,6 @@
 """Compliant origami on FEniCSx: thin elastic sheets with creases.
 
 The names below are loaded when they are first used, so that importing the package costs nothing.
-`build` (a scene's discrete model, for those who solve it themselves) is in `ufl_origami.build`.
 """
 
 from importlib import import_module
@@ -23,6 +22,12 @@ _HOMES = {
     "SolveError": "errors",
     "StaticResult": "run",
     "StepSettings": "solvers.static",
+    "NewtonSolver": "solvers.newton",
+    "StaticPath": "solvers.static",
+    "MeshWarning": "errors",
+    "StabilityWarning": "errors",
+    "SupportWarning": "errors",
+    "build": "discretise",
     "mesh_pattern": "meshing",
     "read_fold": "fold_io",
     "read_history": "history",

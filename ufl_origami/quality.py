@@ -15,8 +15,10 @@ figure is LONG_EDGE (a/l)^2 with l the panel's extent across the edge; only stre
 count, a mesh that is coarse both ways being the user's choice.
 
 Sagitta: kappa a^2 / (8 h), kappa the largest principal curvature and a the longest edge: the height
-of the arc over an edge against the thickness. At 3 and more a wide plate on an unstructured mesh
-loses several percent of its deflection.
+of the arc over an edge against the thickness. A wide cantilever plate under end shear (directors)
+loses of its deflection, on unstructured meshes: 0.3 % at 1.3, 1 % at 3.9, 5 % at 11, 10 % at 39;
+criss-cross meshes lock sooner: 2 % at 0.33, 6 % at 0.9, 14 % at 3.5. One-diagonal meshes whose
+edges follow the rulings do not lock at all.
 """
 
 import warnings

@@ -18,9 +18,9 @@ from petsc4py import PETSc
 
 from tqdm import tqdm
 
-from ufl_origami.build import build
 from ufl_origami.checkpoint import Checkpoint, Progress
 from ufl_origami.collective import on_rank0
+from ufl_origami.discretise import build
 from ufl_origami.errors import InputError, SolveError
 from ufl_origami.history import CsvFile, History, Record, Recorder, Row, read_history, step_row
 from ufl_origami.interrupt import InterruptRequest

@@ -1,6 +1,6 @@
 """A scene: a sheet, its materials and creases, and the named things done to it.
 
-A scene only declares. `build` (build.py) makes exactly the terms and unknowns that it names.
+A scene only declares. `build` (discretise.py) makes exactly the terms and unknowns that it names.
 
 Values: a number or vector is proportional to the load factor (or time); a function of time is
 taken as it is. Displacement components may also be functions f(time, rest) of the rest
@@ -305,6 +305,13 @@ class Scene:
         self.loads.append(LoadSpec(kind, name, value))
 
     def _require_place(self, name: str) -> None:
+        sheet = self.sheet
+        kinds = {"point": sheet.points, "panel": sheet.panel_names, "edge set": sheet.edges}
+        found = [kind for kind, names in kinds.items() if name in names]
+        if len(found) > 1:
+            raise SceneError(
+                f"{name!r} names several places ({', '.join(found)}): rename all but one"
+            )
         if name not in self.sheet.points and name not in self.sheet.panel_names:
             self.sheet.edge_facets(name)
 
