@@ -29,7 +29,6 @@ def test_directors_give_the_elastica_under_end_shear(structure):
     assert largest_error(cantilever_shear(4, Form(structure))) < 0.001
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize(
     ("structure", "n"), [("structured", 6), ("unstructured", 4), ("crisscross", 4)]
 )
@@ -37,7 +36,6 @@ def test_directors_roll_up_to_a_full_circle(structure, n):
     assert largest_error(cantilever_moment(n, Form(structure))) < 0.005
 
 
-@pytest.mark.mpi
 def test_end_shear_agrees_with_the_table_of_sze():
     problem = cantilever_shear(4)
     table = read_table(REFERENCE / "sze2004_cantilever_end_shear.csv")
@@ -45,7 +43,6 @@ def test_end_shear_agrees_with_the_table_of_sze():
     assert max(np.abs(e).max() for e in errors.values()) < 0.005
 
 
-@pytest.mark.mpi
 def test_end_moment_agrees_with_the_table_of_sze():
     """At full load the table's deflection is zero: the last digit counts, not the ratio."""
     problem = cantilever_moment(4, Form("unstructured"))
@@ -95,7 +92,6 @@ def test_averaged_normals_converge_to_a_wrong_answer_on_crisscross():
     assert abs(axial[0] - axial[1]) < 0.02
 
 
-@pytest.mark.mpi
 @pytest.mark.filterwarnings("ignore::ufl_origami.errors.MeshWarning")
 def test_averaged_normals_are_off_by_percents_on_an_unstructured_mesh():
     errors = {
@@ -128,7 +124,6 @@ def critical_load(points=200):
     return low
 
 
-@pytest.mark.mpi
 def test_a_free_strip_rolled_up_by_a_conservative_moment_buckles_sideways():
     """The tangent's inertia changes where the theory of rods has the strip buckle."""
     critical = critical_load()
