@@ -9,6 +9,7 @@ from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.meshing import mesh_pattern
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import sheet_from_arrays
+from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, StepSettings
 
@@ -18,7 +19,8 @@ E, H = 1e7, 0.01
 def follow(model, stops=(1.0,), *, first=0.125, newton=None, on_accept=None):
     """Accepted steps of a static path from rest."""
     newton = newton or NewtonSettings()
-    path = StaticPath(model.problem, NewtonSolver(model.problem, newton), StepSettings(first=first))
+    solver = NewtonSolver(model.problem, newton)
+    path = StaticPath(model.problem, solver, StepSettings(first=first), Admissible(model))
     path.run(model.x, 0.0, stops, on_accept)
     return path
 

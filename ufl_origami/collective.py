@@ -43,21 +43,32 @@ def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
 
 @contextmanager
 def together(comm: MPI.Comm) -> Iterator[None]:
-    """Let an InputError of any rank inside the block be raised on all ranks.
+    """Let an exception of any rank inside the block be raised on all ranks.
 
     Args:
         comm: communicator; all ranks must enter, and the block must not communicate.
+
+    Raises:
+        Exception: where the block raised it; on the other ranks the same class with the same
+            message for the package's InputError classes, else a RuntimeError.
     """
-    error: InputError | None = None
+    error: Exception | None = None
     try:
         yield
-    except InputError as caught:
+    except Exception as caught:
         error = caught
     told = comm.allgather([] if error is None else [(type(error), str(error))])
     if error is not None:
         raise error
     for kind, message in (entry for entries in told for entry in entries):
-        raise kind(message)
+        raise _told(kind, message)
+
+
+def _told(kind: type[Exception], message: str) -> Exception:
+    """What a rank raises that is told of another rank's exception."""
+    if issubclass(kind, InputError):
+        return kind(message)
+    return RuntimeError(f"another rank raised {kind.__name__}: {message}")
 
 
 def reduced(comm: MPI.Comm, values: np.ndarray, op: MPI.Op = MPI.SUM) -> np.ndarray:

@@ -68,6 +68,8 @@ def check_tags(
     """Check the named edges and points; return the sorted edge numbers of each named edge set."""
     found = {}
     for name, pairs in edges.items():
+        if not len(pairs):
+            raise MeshError(f"edge set {name!r} is empty")
         index = table.find(pairs)
         if (index < 0).any():
             pair = pairs[np.argmin(index)]

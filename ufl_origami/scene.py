@@ -23,6 +23,9 @@ from ufl_origami.terms.crease import CreaseLaw
 from ufl_origami.terms.form import SheetFunctions
 
 TimeFunction = Callable[[float], float]
+IN_PLANE = 1e-6
+"""Sine of the angle to a mirror plane below which a triangle lies in it."""
+
 Scalar = float | TimeFunction
 Displacement = Scalar | Callable[..., np.ndarray | float]
 Vector = Sequence[float] | Callable[[float], np.ndarray]
@@ -243,7 +246,10 @@ class Scene:
         normal = np.eye(3)["xyz".index(axis)]
 
         def outward(time: float, rest: np.ndarray) -> np.ndarray:
-            return np.where(rest @ normal > 0, 1.0, -1.0)[:, None] * normal
+            across = rest @ normal
+            if (np.abs(across) < IN_PLANE).any():
+                raise SceneError(f"symmetry {name!r}: the sheet lies in the mirror plane itself")
+            return np.where(across > 0, 1.0, -1.0)[:, None] * normal
 
         self.clamps.append(ClampSpec(name, outward, natural=False))
 
@@ -281,6 +287,8 @@ class Scene:
                 length), positive where the sheet bends towards its normal.
         """
         self.sheet.panel_cells(name)
+        if name in self.curvatures:
+            raise SceneError(f"natural curvature {name!r}: the panel has one already")
         tensor = np.asarray(tensor, dtype=float)
         if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
             raise SceneError(f"natural curvature {name!r}: expected a symmetric (3, 3) tensor")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration
 from ufl_origami.constraints import Constraints
 from ufl_origami.creases import EdgeFan, spring_edges
@@ -52,6 +53,7 @@ def crease_springs(
     missing = set(scene.sheet.creases) - {spec.name for spec in scene.creases}
     if missing:
         raise SceneError(f"creases without stiffness: {sorted(missing)}")
+    refuse_shared_edges(scene.sheet, fans)
     springs: list[Spring] = []
     seen: set[tuple[str, frozenset[int]]] = set()
     for spec in scene.creases:
@@ -66,6 +68,20 @@ def crease_springs(
             shape += edges.coefficient[:, column] * rest_angles[spec.name][:, k - 1]
         springs.append(Spring(spec, CreaseModel(fan, edges, pair), shape))
     return springs
+
+
+def refuse_shared_edges(sheet: SheetMesh, fans: Mapping[str, EdgeFan]) -> None:
+    """Refuse creases that share an edge, which would have the springs of both; collective.
+
+    Raises:
+        SceneError: naming two such creases.
+    """
+    owner: dict[int, str] = {}
+    with together(sheet.comm):
+        for name, fan in fans.items():
+            for facet in map(int, fan.facets):
+                if owner.setdefault(facet, name) != name:
+                    raise SceneError(f"creases {owner[facet]!r} and {name!r} share an edge")
 
 
 def spring_sides(sheet: SheetMesh, fan: EdgeFan, spec: CreaseSpec) -> tuple[int, int]:

@@ -2,6 +2,8 @@
 
 from petsc4py import PETSc
 
+from ufl_origami.errors import SolveError
+
 CHOLESKY = {
     "ksp_type": "preonly",
     "pc_type": "cholesky",
@@ -33,12 +35,22 @@ class Factorisation:
         self.count = 0
 
     def factor(self) -> int | None:
-        """Factor the matrix as it is now; number of negative pivots, None where unknown."""
+        """Factor the matrix as it is now; number of negative pivots, None where unknown.
+
+        Raises:
+            SolveError: the solver package ran out of memory.
+        """
         self.ksp.setOperators(self.matrix)
         self._ask_inertia()
         self.ksp.setUp()
         self.ksp.pc.setUp()
         self.count += 1
+        if self.ksp.pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
+            unknowns = self.matrix.getSize()[0]
+            raise SolveError(
+                f"the factorisation of {unknowns} unknowns ran out of memory: use more ranks on "
+                "more machines, or an iterative solver (NewtonSettings.options)"
+            )
         return self.negative_pivots()
 
     def _ask_inertia(self) -> None:

@@ -7,6 +7,7 @@ show, a mass-weighted diagonal shift is raised until there are none. A watchdog 
 full steps that did not converge by a few steps with an energy line search.
 """
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -19,11 +20,16 @@ from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
 from ufl_origami.solvers.options import option_scope
 
+log = logging.getLogger(__name__)
+
 FIRST_SHIFT = 1e-10
 """First diagonal shift, over the largest ratio of tangent diagonal to weight."""
 
 SHIFT_FACTOR = 8.0
 """The guard first tries the last shift over this, then raises it by this."""
+
+SHIFT_TRIES = 40
+"""Shifts that the guard tries at one tangent."""
 
 REASONS = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
 
@@ -176,12 +182,13 @@ class NewtonSolver:
             ratio.pointwiseDivide(diagonal, self._shift_weights)
             self.shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
         shift = self.shift / SHIFT_FACTOR
-        for _ in range(40):
+        for _ in range(SHIFT_TRIES):
             matrix.setDiagonal(diagonal + shift * self._shift_weights)
             if not linear.factor():
-                break
+                self.shift = shift
+                return
             shift *= SHIFT_FACTOR
-        self.shift = shift
+        log.warning("no shift up to %.1e made the tangent positive definite", shift)
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple) -> int:
         reason = PETSc.SNES.ConvergedReason
