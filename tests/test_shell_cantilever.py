@@ -61,6 +61,7 @@ def test_end_moment_agrees_with_the_table_of_sze():
         (cantilever_shear, "averaged"),
     ],
 )
+@pytest.mark.filterwarnings("ignore::ufl_origami.errors.MeshWarning")
 def test_one_diagonal_converges_with_order_two(make, bending):
     """Thin, so that the extension, which the elastica lacks, stays below the errors."""
     counts = (1, 2, 4)
