@@ -99,6 +99,7 @@ MESHES = {
 
 
 @pytest.mark.convergence
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("mesh", "eta"),
     [
