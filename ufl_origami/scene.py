@@ -172,7 +172,8 @@ class Scene:
         Args:
             name: crease.
             stiffness: K_r per unit length (moment per length and radian); a constant in time, or
-                a function of time; 0 is a free hinge, inf a stiff fold.
+                a function of time; 0 is a free hinge, inf a stiff fold (a huge number instead
+                would raise the round-off floor of the tolerance).
             rest_angle: fold angle (radians, valley positive) without moment, a constant in time or
                 a function of time; default that of the rest state.
             law: instead of stiffness and rest_angle, energy, moment and stiffness as functions.
