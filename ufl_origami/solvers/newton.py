@@ -43,6 +43,10 @@ class NewtonSettings:
             or one of SNES's line searches by name ("bt", "l2", "cp") with the plain tangent.
         rtol: residual norm over the largest norm of one term's forces.
         iterations: full steps in one run.
+        patience: first full steps of a run that the guard leaves alone: the extrapolated stress
+            often makes the first tangents indefinite on the way to a minimum, and a shift there
+            costs far more iterations than it saves. A run that ends unstable this way is repeated
+            with the guard from its first step.
         cycles: runs of the watchdog, each with twice the line-search steps of the one before.
         floor: tolerance floor in units of eps max K_ii max |x|.
         prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
@@ -52,6 +56,7 @@ class NewtonSettings:
     method: str = "default"
     rtol: float = 1e-9
     iterations: int = 12
+    patience: int = 2
     cycles: int = 4
     floor: float = 30.0
     prefix: str = "ufl_origami_"
@@ -97,6 +102,8 @@ class NewtonSolver:
         self._residual_vector = problem.configuration.create_vector()
         self._previous: PETSc.Vec | None = None
         self._mip = self._guard = self.settings.method == "default"
+        self._patience = self.settings.patience
+        self._excess = self._unguarded = False  # pivots of the last tangent; left alone before
         self._shift_weights = shift_weights(problem)
         self.shift, self._floor = 0.0, 0.0
         own = {"default": "basic", "newton": "basic"}
@@ -139,7 +146,10 @@ class NewtonSolver:
         self.problem.stiffness(x)
         self._floor = min(self._floor or np.inf, self._round_off(x))
         self.problem.constrain(matrix, None, None)
-        self.factor(snes.getKSP())
+        early = self._mip and snes.getIterationNumber() < self._patience
+        found = self.factor(snes.getKSP(), shift=not early)
+        self._excess = self._guard and (found or 0) > self.allowed
+        self._unguarded |= early and self._excess
         if self._previous is None:
             self._previous = x.duplicate()
         x.copy(self._previous)
@@ -161,15 +171,19 @@ class NewtonSolver:
         eps = np.finfo(float).eps
         return self.settings.floor * eps * diagonal.norm(PETSc.NormType.INFINITY) * size
 
-    def factor(self, ksp: PETSc.KSP) -> int | None:
+    def factor(self, ksp: PETSc.KSP, *, shift: bool = True) -> int | None:
         """Factor the constrained tangent; with the guard, shift it until positive definite.
+
+        Args:
+            ksp: linear solver.
+            shift: whether the guard may act.
 
         Returns:
             Negative pivots of the tangent itself, None where unknown.
         """
         linear = Factorisation(ksp, self.problem.tangent.matrix, self.problem.symmetric)
         found = linear.factor()
-        if self._guard and found and found > self.allowed:
+        if self._guard and shift and found and found > self.allowed:
             self._raise_shift(linear)
         self.report.factorisations += linear.count
         return found
@@ -217,18 +231,31 @@ class NewtonSolver:
         """
         self._previous = None if previous is None else previous.copy()
         settings = self.settings
+        self._patience = settings.patience
         if settings.method != "default":
             self.report.converged = self._run(self._full, x, 10 * settings.iterations)
             return self.report
         start = x.copy()
         for cycle in range(settings.cycles):
-            if self._run(self._full, x, settings.iterations):
+            if self._full_steps(x):
                 self.report.converged = True
                 return self.report
             if cycle + 1 < settings.cycles and self._line_search(start, x, 4 * 2**cycle):
                 self.report.converged = True
                 return self.report
         return self.report
+
+    def _full_steps(self, x: PETSc.Vec) -> bool:
+        """One run of full steps; with the guard from the first one where it ends unstable else."""
+        start = x.copy()
+        previous = None if self._previous is None else self._previous.copy()
+        self._unguarded = False
+        done = self._run(self._full, x, self.settings.iterations)
+        if not (done and self._excess and self._unguarded):
+            return done
+        start.copy(x)
+        self._previous, self._patience = previous, 0
+        return self._run(self._full, x, self.settings.iterations)
 
     def _line_search(self, start: PETSc.Vec, x: PETSc.Vec, iterations: int) -> bool:
         """Watchdog: keep or go back, then steps with line search and the plain tangent."""
