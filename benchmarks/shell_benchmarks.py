@@ -19,6 +19,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 import numpy as np
+from _record import machine
 
 from ufl_origami.analytic.reference_tables import read_table
 from ufl_origami.errors import MeshWarning, SolveError
@@ -164,8 +165,14 @@ def main() -> None:
         if rank == 0:
             print(rows[-1].line(), flush=True)
     if options.output and rank == 0:
-        text = json.dumps({"stops": STOPS, "runs": [asdict(row) for row in rows]}, indent=1)
-        options.output.write_text(text + "\n", encoding="ascii")
+        data = {
+            "benchmark": "shell accuracy",
+            "machine": machine(MPI.COMM_WORLD),
+            "stops": STOPS,
+            "rows": [asdict(row) for row in rows],
+        }
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(json.dumps(data, indent=1) + "\n", encoding="ascii")
 
 
 if __name__ == "__main__":

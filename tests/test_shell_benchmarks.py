@@ -3,6 +3,10 @@
 Coarse meshes in the fast suite; the finest ones, with the accuracy that is promised, are slow.
 """
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +75,25 @@ def test_averaged_normals_on_the_hemisphere(structure, low, high):
     """Off by 3 % where they are consistent, by a third where they are not."""
     _, exact, _ = solve(pinched_hemisphere(32, Form(structure, "averaged")))
     assert low < max(exact.values()) < high
+
+
+@pytest.mark.serial
+def test_the_command_prints_and_writes_what_it_found(tmp_path):
+    script = Path(__file__).parents[1] / "benchmarks" / "shell_benchmarks.py"
+    file = tmp_path / "table.json"
+    choice = "--problem hemisphere_18deg_hole --mesh unstructured --bending director --n 16"
+    done = subprocess.run(
+        [sys.executable, str(script), *choice.split(), "--output", str(file)],
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(script.parents[1])},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(file.read_text())["rows"]
+    _, exact, published = solve(pinched_hemisphere(16, Form("unstructured")))
+    for kind, expected in (("kirchhoff_love", exact), ("sze", published)):
+        found = {name: max(map(abs, e)) / 100 for name, e in row["errors"][kind].items()}
+        assert found == pytest.approx(expected, rel=1e-6)
+        assert f"{100 * max(expected.values()):.3f}" in done.stdout
+    assert len(done.stdout.splitlines()) == 2
 
 
 @pytest.mark.slow
