@@ -128,14 +128,15 @@ def test_hemisphere(structure):
 @pytest.mark.slow
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_cylinder(structure):
-    """Away from the point load the tables agree, under it they do not.
+    """Away from the point load the tables agree; under it no mesh-independent value exists.
 
-    Under the load the Kirchhoff-Love table (uniform splines, elements four times as long as h) is
-    too stiff by 1.3 %: the same splines graded towards the load move its W_A up to ours, the rest
-    stays. Sze's elements shear and are softer there.
+    Where the sheet slopes, the point force pulls in its plane, and the displacement under it grows
+    with the logarithm of the element there: at the four loads the table's splines (elements four
+    times h) give W_A 0.13, 0.27, 0.45 and 0.6 % less than splines graded down to h / 2, with U_B
+    and U_C the same to 0.1 %. Ours lies 0.5 to 1.2 % above the table, below Sze's.
     """
     steps, exact, published = solve(cylinder_pullout(64, Form(structure)))
     assert_stable(steps)
     assert max(exact["minus_U_B"], exact["minus_U_C"]) < 0.005
     assert exact["W_A"] < 0.015
-    assert max(published.values()) < 0.025
+    assert max(published.values()) < 0.01
