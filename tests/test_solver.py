@@ -157,6 +157,15 @@ def test_options_under_the_prefix_reach_the_solver_and_leave_no_trace():
     assert not [key for key in PETSc.Options().getAll() if key.startswith("mine_")]
 
 
+def test_options_that_the_factorisation_reads_late_reach_it_too():
+    model = build(z_fold_scene(0.4, 0.3, d1=0.2))
+    settings = NewtonSettings(prefix="late_", options={"mat_mumps_icntl_14": 55})
+    solver = NewtonSolver(model.problem, settings)
+    StaticPath(model.problem, solver, StepSettings()).run(model.x, 0.0, [1.0])
+    assert solver.linear.ksp.pc.getFactorMatrix().getMumpsIcntl(14) == 55
+    assert not [key for key in PETSc.Options().getAll() if key.startswith("late_")]
+
+
 def test_options_of_the_user_win_over_the_defaults():
     PETSc.Options().setValue("ufl_origami_pc_type", "lu")
     try:

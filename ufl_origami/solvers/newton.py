@@ -120,18 +120,18 @@ class NewtonSolver:
         snes.setConvergenceTest(self._converged)
         if self.problem.conservative and line_search == "bt":
             snes.setObjective(lambda _, x: self.problem.potential(x))
-        with self._scope(line_search):
+        with self._scope({"snes_linesearch_type": line_search}):
             snes.setFromOptions()
             snes.getKSP().setOperators(matrix)
             snes.getKSP().pc.setOperators(matrix)
             snes.getKSP().pc.setFromOptions()
         return snes
 
-    def _scope(self, line_search: str):
-        """Options of one of the solver's SNES, for as long as it works."""
+    def _scope(self, own: Mapping[str, object] | None = None):
+        """Options of the solver, for as long as it works: MUMPS reads some when it factors."""
         defaults = {
+            **(own or {}),
             "snes_type": "newtonls",
-            "snes_linesearch_type": line_search,
             "snes_divergence_tolerance": 1e30,
             **linear_options(self.problem.symmetric),
         }
@@ -182,9 +182,10 @@ class NewtonSolver:
             Negative pivots of the tangent itself, None where unknown.
         """
         linear = Factorisation(ksp, self.problem.tangent.matrix, self.problem.symmetric)
-        found = linear.factor()
-        if self._guard and shift and found and found > self.allowed:
-            self._raise_shift(linear)
+        with self._scope():
+            found = linear.factor()
+            if self._guard and shift and found and found > self.allowed:
+                self._raise_shift(linear)
         self.report.factorisations += linear.count
         return found
 

@@ -123,6 +123,7 @@ class StaticPath:
         if any(later <= earlier for earlier, later in pairwise(stops)):
             raise InputError(f"stops {list(stops)} do not increase")
         time, size = start, self.size or self.settings.first
+        self.newton.allowed = 0
         self._unstable = self._factor_at(x, time) or 0
         for stop in stops:
             while time < stop - 1e-12 * max(1.0, abs(stop)):
