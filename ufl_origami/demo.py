@@ -19,10 +19,8 @@ from mpi4py import MPI
 
 from ufl_origami.errors import InputError
 from ufl_origami.meshing import STRUCTURES
+from ufl_origami.scene import MODELS
 from ufl_origami.stencils import BENDING_FORMS
-
-#: Discretisations of the sheet. A further one joins here and in the demos' `build_model`.
-MODELS = ("ddg",)
 
 Defaults = Mapping[str, Any]
 _HEAD_START = 1.0  # seconds

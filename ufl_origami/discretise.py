@@ -53,6 +53,8 @@ def build(scene: Scene) -> Model:
     Warns:
         MeshWarning: the mesh cannot represent the scene's bending form (see quality.py).
     """
+    if scene.model == "fem":
+        raise SceneError("the fem model is not there yet")
     sheet = scene.sheet
     sides = edge_sides(sheet)
     warn_mesh(scene, sides)

@@ -23,6 +23,9 @@ from ufl_origami.terms.crease import CreaseLaw
 from ufl_origami.terms.form import SheetFunctions
 
 TimeFunction = Callable[[float], float]
+MODELS = ("ddg", "fem")
+"""Discretisations of the panels and creases."""
+
 IN_PLANE = 1e-6
 """Sine of the angle to a mirror plane below which a triangle lies in it."""
 
@@ -119,9 +122,11 @@ class Scene:
         bending: "director" (default; tilt measure tan) or "averaged" (the paper's; sin).
         measure: tilt measure "tan" or "sin", to override the form's own.
         membrane: "kernel" (default, fused with bending) or "ufl" (the same energy as a form).
+        model: "ddg" (default) or "fem", an independent shell element of second order; `bending`,
+            `measure` and `membrane` are choices of the ddg model.
 
     Raises:
-        SceneError: unknown bending form, measure, panel; panel without material.
+        SceneError: unknown model, bending form, measure, panel; panel without material.
     """
 
     sheet: SheetMesh
@@ -129,6 +134,7 @@ class Scene:
     bending: str = "director"
     measure: str | None = None
     membrane: str = "kernel"
+    model: str = "ddg"
     creases: list[CreaseSpec] = field(default_factory=list)
     motions: list[MotionSpec] = field(default_factory=list)
     clamps: list[ClampSpec] = field(default_factory=list)
@@ -138,6 +144,8 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check names and fill in the form's own tilt measure."""
+        if self.model not in MODELS:
+            raise SceneError(f"model {self.model!r} is none of {MODELS}")
         if self.bending not in BENDING_FORMS:
             raise SceneError(f"bending {self.bending!r} is none of {BENDING_FORMS}")
         if self.membrane not in ("kernel", "ufl"):

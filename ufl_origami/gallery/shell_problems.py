@@ -39,11 +39,13 @@ class Form:
     Attributes:
         structure: "structured" (one diagonal), "crisscross" or "unstructured".
         bending: "director" or "averaged".
+        model: "ddg" or "fem".
         comm: communicator.
     """
 
     structure: str = "structured"
     bending: str = "director"
+    model: str = "ddg"
     comm: MPI.Comm = field(default_factory=lambda: MPI.COMM_WORLD)
 
 
@@ -200,7 +202,7 @@ def _cantilever(n: Count, form: Form, size: tuple[float, float, float]) -> Scene
     length, thickness, stiffness = size
     sheet = rectangle(length, 1.0, n, structure=form.structure, comm=form.comm)
     material = Material(E=12.0 * stiffness / thickness**3, nu=0.0, h=thickness)
-    scene = Scene(sheet, material, bending=form.bending)
+    scene = Scene(sheet, material, bending=form.bending, model=form.model)
     scene.fix("x0")
     scene.clamp("x0")
     return scene
@@ -214,7 +216,7 @@ def slit_annular_plate(n: Count, form: Form = FORM) -> ShellProblem:
         form: mesh and bending form.
     """
     sheet = slit_annulus(6.0, 10.0, n, structure=form.structure, comm=form.comm)
-    scene = Scene(sheet, Material(E=21e6, nu=0.0, h=0.03), bending=form.bending)
+    scene = Scene(sheet, Material(E=21e6, nu=0.0, h=0.03), bending=form.bending, model=form.model)
     scene.fix("slit_clamped")
     scene.clamp("slit_clamped")
     scene.line_load("slit_loaded", (0.0, 0.0, 0.8))
@@ -234,7 +236,7 @@ def pinched_hemisphere(n: Count, form: Form = FORM) -> ShellProblem:
         form: mesh and bending form.
     """
     sheet = hemisphere_quarter(10.0, n, structure=form.structure, comm=form.comm)
-    scene = Scene(sheet, Material(E=6.825e7, nu=0.3, h=0.04), bending=form.bending)
+    scene = Scene(sheet, Material(E=6.825e7, nu=0.3, h=0.04), bending=form.bending, model=form.model)
     scene.symmetry("sym_x0", "x")
     scene.symmetry("sym_y0", "y")
     scene.fix("A", "z")
@@ -257,7 +259,7 @@ def cylinder_pullout(n: Count, form: Form = FORM) -> ShellProblem:
         form: mesh and bending form.
     """
     sheet = cylinder_octant(4.953, 10.35, n, structure=form.structure, comm=form.comm)
-    scene = Scene(sheet, Material(E=10.5e6, nu=0.3125, h=0.094), bending=form.bending)
+    scene = Scene(sheet, Material(E=10.5e6, nu=0.3125, h=0.094), bending=form.bending, model=form.model)
     for axis in "xyz":
         scene.symmetry(f"sym_{axis}0", axis)
     scene.point_load("A", (0.0, 0.0, 10e3))
