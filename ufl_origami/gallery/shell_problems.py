@@ -236,7 +236,9 @@ def pinched_hemisphere(n: Count, form: Form = FORM) -> ShellProblem:
         form: mesh and bending form.
     """
     sheet = hemisphere_quarter(10.0, n, structure=form.structure, comm=form.comm)
-    scene = Scene(sheet, Material(E=6.825e7, nu=0.3, h=0.04), bending=form.bending, model=form.model)
+    scene = Scene(
+        sheet, Material(E=6.825e7, nu=0.3, h=0.04), bending=form.bending, model=form.model
+    )
     scene.symmetry("sym_x0", "x")
     scene.symmetry("sym_y0", "y")
     scene.fix("A", "z")
@@ -259,7 +261,9 @@ def cylinder_pullout(n: Count, form: Form = FORM) -> ShellProblem:
         form: mesh and bending form.
     """
     sheet = cylinder_octant(4.953, 10.35, n, structure=form.structure, comm=form.comm)
-    scene = Scene(sheet, Material(E=10.5e6, nu=0.3125, h=0.094), bending=form.bending, model=form.model)
+    scene = Scene(
+        sheet, Material(E=10.5e6, nu=0.3125, h=0.094), bending=form.bending, model=form.model
+    )
     for axis in "xyz":
         scene.symmetry(f"sym_{axis}0", axis)
     scene.point_load("A", (0.0, 0.0, 10e3))
