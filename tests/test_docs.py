@@ -61,7 +61,7 @@ def test_first_scene_runs_and_agrees_with_the_elastica(tmp_path, monkeypatch, ca
 
 
 def test_example_of_an_own_term_runs_as_it_stands(tmp_path):
-    term, test = blocks(ROOT / "CONTRIBUTING.md")
+    term, test, _ = blocks(ROOT / "CONTRIBUTING.md")
     (tmp_path / "foundation.py").write_text(term)
     (tmp_path / "test_foundation.py").write_text(test)
     options = ["-q", "-c", ROOT / "pyproject.toml", "--rootdir", tmp_path, "-p", "no:cacheprovider"]

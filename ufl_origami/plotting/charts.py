@@ -82,24 +82,41 @@ def profile_chart(
     file: str | Path,
     *,
     labels: tuple[str, str] = ("x / W", "z / W"),
+    columns: int | None = None,
 ) -> Path:
-    """Profiles at equal scale on both axes, one chart per title of `panels`, side by side."""
+    """Profiles at equal scale on both axes, one chart per title of `panels`, side by side.
+
+    Args:
+        panels: title of a chart -> its curves.
+        file: file to write.
+        labels: names of the axes.
+        columns: charts in a row, default all.
+    """
     every = [series for group in panels.values() for series in group]
     if not every:
         raise InputError(f"chart {Path(file).name}: nothing to draw")
     wide, high = (np.ptp(np.concatenate([np.asarray(getattr(s, a)) for s in every])) for a in "xy")
-    width = max(2.5, 6.2 / len(panels))
+    across = min(columns or len(panels), len(panels))
+    rows = ceil(len(panels) / across)
+    width = max(2.5, 6.2 / across)
     height = min(max(0.9 * width * high / wide, 1.0), 6.0) if wide > 0 else 3.0
-    wide, labels_of = width * len(panels) + 0.4, {series.label for series in every}
+    wide, labels_of = width * across + 0.4, {series.label for series in every}
     legend = ceil(len(labels_of) / _legend_columns(labels_of, wide))
-    with _figure(file, (wide, height + 0.8 + 0.2 * legend)) as (figure, path):
-        row = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
-        for axes, (title, group) in zip(row, panels.items(), strict=True):
+    with _figure(file, (wide, rows * (height + 0.5) + 0.3 + 0.2 * legend)) as (figure, path):
+        grid = figure.subplots(rows, across, sharex=True, sharey=True, squeeze=False)
+        charts: list[Any] = list(grid.flat)[: len(panels)]
+        for axes, (title, group) in zip(charts, panels.items(), strict=True):
             _draw(axes, group, every)
-            axes.set(title=title, xlabel=labels[0])
+            axes.set(title=title)
             axes.set_aspect("equal", adjustable="box")
-        row[0].set_ylabel(labels[1])
-        _legend(figure, row)
+        for axes in charts[-across:]:
+            axes.set_xlabel(labels[0])
+            axes.xaxis.set_tick_params(labelbottom=True)
+        for axes in grid[:, 0]:
+            axes.set_ylabel(labels[1])
+        for axes in grid.ravel()[len(panels) :]:
+            axes.set_visible(False)
+        _legend(figure, charts)
     return path
 
 
