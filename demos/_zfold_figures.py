@@ -29,7 +29,8 @@ class Study:
 
     Attributes:
         folder: where the figures go.
-        variants: pairs of bending form and Poisson's ratio.
+        model: discretisation of the sheet.
+        variants: pairs of bending form (None: the model has one only) and Poisson's ratio.
         etas: crease stiffnesses, ascending.
         openings: openings d1, ascending.
         profile_etas: those etas whose profiles are drawn.
@@ -41,7 +42,8 @@ class Study:
     """
 
     folder: Path
-    variants: list[tuple[str, float]]
+    model: str
+    variants: list[tuple[str | None, float]]
     etas: list[float]
     openings: list[float]
     profile_etas: list[float]
@@ -55,6 +57,10 @@ class Study:
     def file(self, name: str) -> Path:
         """File of a figure."""
         return self.folder / f"{name}.png"
+
+    def form(self, bending: str | None) -> str:
+        """Name of a bending form in legends: the model's own where it has one only."""
+        return bending or self.model
 
     @property
     def taut_opening(self) -> float:
@@ -97,9 +103,9 @@ def marks(rows, key, label, *, colour, factor=1.0):
     return Series([run["eta"] for run in rows], y, label, "points", colour=colour)
 
 
-def title(bending, nu):
+def title(study, bending, nu):
     """Name of a variant in legends."""
-    return rf"{bending}, $\nu = {nu:g}$"
+    return rf"{study.form(bending)}, $\nu = {nu:g}$"
 
 
 def profile_series(study, eta, d1, colour):
@@ -110,7 +116,7 @@ def profile_series(study, eta, d1, colour):
     stride = max(1, len(now) // 12)
     some = np.r_[crease:-1:-stride][:0:-1], np.r_[crease + stride : len(now) : stride]
     x, _, z = (now[np.concatenate(some)] - now[crease]).T
-    marked = [Series(x, z, rf"{bending}, $d_1 = {d1:g}$", "points", colour=colour)]
+    marked = [Series(x, z, rf"{study.form(bending)}, $d_1 = {d1:g}$", "points", colour=colour)]
     if d1 >= study.taut_opening:
         return [], marked
     panels = [part - part[-1] for part in study.solved(eta, d1).profile()]
@@ -157,7 +163,7 @@ def draw_fold_angle(study, fine):
     for i, (bending, nu) in reversed([*enumerate(study.variants)]):
         if nu == study.variants[0][1]:
             rows = picked(study.runs, bending=bending, nu=nu, d1=study.featured[1])
-            series.append(marks(rows, "fold_angle_deg", title(bending, nu), colour=i))
+            series.append(marks(rows, "fold_angle_deg", title(study, bending, nu), colour=i))
     fold_angle_chart(series, study.file("fold_angle"), limits={"rigid": rigid, "rest": rest})
 
 
@@ -177,7 +183,7 @@ def draw_difference(study, fine):
         found = {run["eta"]: run["fold_angle_deg"] for run in rows if run["eta"] > 0}
         values = np.array([*found])
         off = np.array([*found.values()]) - exact_angles(study, values)
-        series.append(Series(values, off, title(bending, nu), "points", colour=i))
+        series.append(Series(values, off, title(study, bending, nu), "points", colour=i))
     for nu in sorted({nu for _, nu in study.variants if nu}):
         plate = exact_angles(study, fine * (1 - nu**2)) - exact_angles(study, fine)
         series.append(Series(fine, plate, rf"wide plate, $\nu = {nu:g}$", "dashed", colour=6))
@@ -195,7 +201,7 @@ def draw_openings(study, fine, key):
             series.append(Series(fine, line, rf"elastica, $d_1 = {d1:g}$", colour=i))
         unit = 1.0 if key == "fold_angle_deg" else study.elastica(1.0).bending_stiffness[0]
         rows = picked(study.runs, bending=bending, nu=nu, d1=d1)
-        label = rf"{bending}, $d_1 = {d1:g}$"
+        label = rf"{study.form(bending)}, $d_1 = {d1:g}$"
         series.append(marks(rows, key, label, colour=i, factor=1 / unit))
     name, ordinate = {
         "fold_angle_deg": ("openings", "included fold angle (deg)"),
@@ -218,6 +224,6 @@ def draw_convergence(study):
     for bending in dict.fromkeys(bending for bending, _ in study.variants):
         rows = picked(study.refined, bending=bending)
         error = [abs(run["force"] / run["elastica_force"] - 1) for run in rows]
-        series.append(Series([run["size"] for run in rows], error, bending))
+        series.append(Series([run["size"] for run in rows], error, study.form(bending)))
     labels = ("size of the triangles / W", "relative distance of the pull from the elastica")
     convergence_chart(series, study.file("convergence"), labels=labels, orders=(2,))

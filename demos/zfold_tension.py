@@ -7,11 +7,13 @@ while the panels bend. For nu = 0 each panel is exactly a planar elastica, which
 fold angle within 0.1 deg, pull within 1 %.
 
 Without --eta and --d1 the whole study runs; one value of each computes that case alone, with the
-first bending form and Poisson's ratio unless they are given.
+first bending form and Poisson's ratio unless they are given. The fem model has one bending form of
+its own and takes triangles three times as long.
 
     ./run demo zfold_tension
     ./run demo zfold_tension --eta 0.5 --d1 1.0
     ./run demo zfold_tension -n 2 --bending averaged
+    ./run demo zfold_tension --model fem
 """
 
 from mpi4py import MPI
@@ -21,6 +23,7 @@ from _zfold_figures import Study, draw_all
 
 from ufl_origami.analytic import ZFold
 from ufl_origami.demo import fail_together, print_table, read_options, write_summary
+from ufl_origami.errors import InputError
 from ufl_origami.gallery import z_fold
 from ufl_origami.gather import gather_fold_angles, gather_profile, gather_sheet
 from ufl_origami.material import Material
@@ -32,8 +35,8 @@ from ufl_origami.scene import Scene
 W, E = 1.0, 1e7  # width of a panel and length of the crease; Young's modulus
 PROFILE_ETA = (0.01, 0.5, 100.0)  # low, middle and high crease stiffness, of which profiles show
 FEATURED_D1 = 1.0  # opening in the chart of all models, in the picture and in the convergence
-CONVERGENCE_SIZES = (0.24, 0.12, 0.06, 0.03)
-SIZE = 0.042  # of the triangles over W, by default: 2708 of them
+SIZES = {"ddg": 0.042, "fem": 0.125}  # of the triangles over W, by default
+CONVERGENCE_SIZES = {"ddg": (0.24, 0.12, 0.06, 0.03), "fem": (0.48, 0.24, 0.12, 0.06)}
 ANGLE_TOLERANCE, FORCE_TOLERANCE = 0.1, 0.01  # of the claim: degrees, relative
 
 comm = MPI.COMM_WORLD
@@ -48,15 +51,20 @@ options = read_options(
         "d1": (0.5, 1.0, 1.2),
         "nu": (0.0, 0.3),
         "h": 0.01,
-        "size": SIZE,
+        "size": SIZES["ddg"],
         "mesh": "unstructured",
     },
     quick={"eta": (0.5,), "d1": (1.0,)},
     comm=comm,
 )
+if options.model != "ddg" and "bending" in options.given:
+    raise InputError("--bending is a choice of the ddg model")
+if "size" not in options.given:
+    options.size = SIZES[options.model]
 etas, openings = sorted(set(options.eta)), sorted(set(options.d1))
 single = len(etas) == len(openings) == 1
-variants = [(bending, nu) for nu in dict.fromkeys(options.nu) for bending in options.bending]
+forms = options.bending if options.model == "ddg" else (None,)  # None: the model's only one
+variants = [(bending, nu) for nu in dict.fromkeys(options.nu) for bending in forms]
 variants = variants[:1] if single else variants
 
 
@@ -72,7 +80,9 @@ featured_eta, featured_d1 = nearest(etas, PROFILE_ETA[1]), nearest(openings, FEA
 # %% Model: the sheet, its crease, and what is done to its outer edges
 def build_scene(sheet, bending, nu, eta):
     """The Z-fold whose load factor is the opening d1."""
-    scene = Scene(sheet, Material(E, nu, options.h * W), bending=bending)
+    material = Material(E, nu, options.h * W)
+    form = {"bending": bending} if bending else {}
+    scene = Scene(sheet, material, model=options.model, **form)
     scene.crease("crease", eta * E * (options.h * W) ** 3 / W)
     scene.fix("left_edge")
     scene.move("right_edge", x=1.0, y=0.0, z=0.0)
@@ -86,7 +96,7 @@ def elastica(eta):
 
 def case_folder(bending, nu, eta):
     """Folder of one path's history and fields."""
-    return options.output / f"{bending}_nu{nu:g}_eta{eta:g}"
+    return options.output / f"{bending or options.model}_nu{nu:g}_eta{eta:g}"
 
 
 # %% Solution: one path per crease stiffness, through all openings
@@ -145,15 +155,15 @@ for bending, nu in variants:
         found, shapes[bending, nu, eta] = pull(sheet, bending, nu, eta, output=output)
         runs += found
         if comm.rank == 0:
-            text = f"{bending}, nu = {nu:g}, eta = {eta:g}: {len(found)} openings"
+            text = f"{bending or options.model}, nu = {nu:g}, eta = {eta:g}: {len(found)} openings"
             print(f"{text}, {found[-1]['newton_iterations']} Newton iterations", flush=True)
 
 # %% Convergence with the mesh size, in the whole study only
 refined = []
 if not options.quick and not {"eta", "d1"} & options.given and 0 in options.nu:
-    for size in CONVERGENCE_SIZES:
+    for size in CONVERGENCE_SIZES[options.model]:
         mesh = mesh_pattern(z_fold(W, W), size * W, structure=options.mesh, comm=comm)
-        for bending in options.bending:
+        for bending in forms:
             refined += pull(mesh, bending, 0.0, featured_eta, [featured_d1], size=size)[0]
 
 
@@ -179,7 +189,7 @@ def report():
     for bending, nu in variants:
         rows = [run for run in runs if (run["bending"], run["nu"]) == (bending, nu)]
         size = f"{rows[0]['triangles']} triangles, {rows[0]['dofs']} unknowns"
-        print(f"\n{bending}, nu = {nu:g}, {size}")
+        print(f"\n{bending or options.model}, nu = {nu:g}, {size}")
         print_table([run | deviations(run) for run in rows], COLUMNS)
     if refined:
         print("\nconvergence with the size of the triangles")
@@ -193,6 +203,7 @@ if comm.rank == 0:
     draw_all(
         Study(
             folder=options.output,
+            model=options.model,
             variants=variants,
             etas=etas,
             openings=openings,
@@ -211,8 +222,8 @@ if comm.rank == 0:
 # %% The claim
 def claimed(run):
     """Whether the agreement with the elastica is promised for a run."""
-    form = run["bending"] == "director" and options.mesh == "unstructured"
-    thin, fine = 1e-3 <= run["h"] <= 0.01, run["size"] <= SIZE
+    form = run["bending"] in ("director", None) and options.mesh == "unstructured"
+    thin, fine = 1e-3 <= run["h"] <= 0.01, run["size"] <= SIZES[options.model]
     known = "elastica_force" in run and run["d1"] <= 1.2 and 1e-3 <= run["eta"] <= 100
     return form and thin and fine and known
 
@@ -221,7 +232,8 @@ judged = [deviations(run) for run in runs + refined if claimed(run)]
 if judged:
     angle = max(abs(d["angle off"]) for d in judged)
     force = max(abs(d["force off"]) for d in judged)
-    text = f"director, nu = 0: at most {angle:.3f} deg and {force:.2%} from the elastica"
+    name = "director" if options.model == "ddg" else options.model
+    text = f"{name}, nu = 0: at most {angle:.3f} deg and {force:.2%} from the elastica"
     if comm.rank == 0:
         print(f"{text} ({len(judged)} runs)")
     assert angle < ANGLE_TOLERANCE and force < FORCE_TOLERANCE, f"the claim fails: {text}"

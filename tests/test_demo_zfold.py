@@ -147,6 +147,12 @@ def test_wrong_values_end_with_the_usage(tmp_path):
     assert done.returncode == 2 and "usage: ./run demo zfold_tension" in done.stderr
 
 
+def test_a_bending_form_of_another_model_is_refused(tmp_path):
+    done = demo(tmp_path, "--quick", "--model", "fem", "--bending", "director")
+    assert done.returncode == 1
+    assert done.stderr == "zfold_tension.py: --bending is a choice of the ddg model\n"
+
+
 @pytest.mark.slow
 def test_whole_study_holds_its_claim_in_time(tmp_path):
     start = time.perf_counter()
