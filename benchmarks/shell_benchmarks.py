@@ -3,9 +3,11 @@
 Errors are in percent, the largest over the columns and the load factors 1/4, 1/2, 3/4, 1: against
 the exact elastica or circle for the cantilevers (of the length for the rolled-up one, whose
 deflection returns to zero), against the Kirchhoff-Love tables and those of Sze, Liu & Lo 2004
-(doi:10.1016/j.finel.2003.11.001) for the others. `sagitta/h` above 1 tells of membrane locking.
+(doi:10.1016/j.finel.2003.11.001) for the others. A method is a bending form of the ddg model or
+the fem model, which takes coarser meshes. `sagitta/h` above 1 tells of membrane locking (ddg).
 
     ./run python3 benchmarks/shell_benchmarks.py --problem slit_annular_plate --output table.json
+    ./run python3 benchmarks/shell_benchmarks.py --method director fem --mesh unstructured
 """
 
 import argparse
@@ -29,15 +31,44 @@ from ufl_origami.run import StaticResult
 
 REFERENCE = Path(__file__).parents[1] / "tests" / "reference"
 STOPS = (0.25, 0.5, 0.75, 1.0)
-PROBLEMS: dict[str, tuple[Callable, tuple[int, ...]]] = {
-    "cantilever_end_shear": (shells.cantilever_shear, (1, 2, 4, 8)),
-    "cantilever_end_moment": (shells.cantilever_moment, (1, 2, 4, 8)),
-    "slit_annular_plate": (shells.slit_annular_plate, (4, 8, 16, 24)),
-    "hemisphere_18deg_hole": (shells.pinched_hemisphere, (8, 16, 32, 64)),
-    "cylinder_open_end_pullout": (shells.cylinder_pullout, (12, 24, 48, 72)),
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A benchmark problem and the meshes of its convergence study.
+
+    Attributes:
+        make: the problem from the number of segments and the form.
+        counts: model -> numbers of segments.
+    """
+
+    make: Callable
+    counts: dict[str, tuple[int, ...]]
+
+
+PROBLEMS = {
+    "cantilever_end_shear": Problem(
+        shells.cantilever_shear, {"ddg": (1, 2, 4, 8), "fem": (1, 2, 4)}
+    ),
+    "cantilever_end_moment": Problem(
+        shells.cantilever_moment, {"ddg": (1, 2, 4, 8), "fem": (1, 2, 4)}
+    ),
+    "slit_annular_plate": Problem(
+        shells.slit_annular_plate, {"ddg": (4, 8, 16, 24), "fem": (2, 4, 8)}
+    ),
+    "hemisphere_18deg_hole": Problem(
+        shells.pinched_hemisphere, {"ddg": (8, 16, 32, 64), "fem": (4, 8, 16)}
+    ),
+    "cylinder_open_end_pullout": Problem(
+        shells.cylinder_pullout, {"ddg": (12, 24, 48, 72), "fem": (6, 12, 24)}
+    ),
 }
 STRUCTURES = ("structured", "unstructured", "crisscross")
-BENDING = ("director", "averaged")
+METHODS = {
+    "director": {"model": "ddg", "bending": "director"},
+    "averaged": {"model": "ddg", "bending": "averaged"},
+    "fem": {"model": "fem"},
+}
 
 
 @dataclass
@@ -45,19 +76,19 @@ class Row:
     """One run; errors in percent by column of the tables, at the stops.
 
     Attributes:
-        problem, mesh, n, bending: what was run; n counts segments as the problem's function does.
+        problem, mesh, n, method: what was run; n counts segments as the problem's function does.
         triangles, dofs, steps, iterations, factorisations, seconds: size and effort.
         unstable: accepted states with negative pivots.
         result: displacements at load factor 1.
         errors: reference ("exact", "kirchhoff_love", "sze") -> column -> errors.
-        sagitta: sagitta over thickness in the last state.
+        sagitta: sagitta over thickness in the last state of the ddg model, else None.
         failure: why the run stopped, or an empty string.
     """
 
     problem: str
     mesh: str
     n: int
-    bending: str
+    method: str
     triangles: int
     dofs: int
     steps: int = 0
@@ -67,12 +98,12 @@ class Row:
     unstable: int = 0
     result: dict[str, float] = field(default_factory=dict)
     errors: dict[str, dict[str, list[float]]] = field(default_factory=dict)
-    sagitta: float = float("nan")
+    sagitta: float | None = None
     failure: str = ""
 
     def line(self) -> str:
         """The row of the printed table."""
-        head = f"{self.problem:26}{self.mesh:13}{self.n:4}  {self.bending:9}{self.triangles:7}"
+        head = f"{self.problem:26}{self.mesh:13}{self.n:4}  {self.method:9}{self.triangles:7}"
         effort = f"{self.dofs:7}{self.steps:4}{self.iterations:5}{self.seconds:7.1f}"
         if self.failure:
             return f"{head}{effort}  {self.failure}"
@@ -81,11 +112,12 @@ class Row:
             for name in ("exact", "kirchhoff_love", "sze")
         )
         result = "  ".join(f"{name} {value:.5g}" for name, value in self.result.items())
-        return f"{head}{effort}{errors}{self.sagitta:9.2f}  {result}"
+        sagitta = f"{'-':>9}" if self.sagitta is None else f"{self.sagitta:9.2f}"
+        return f"{head}{effort}{errors}{sagitta}  {result}"
 
 
 HEAD = (
-    f"{'problem':26}{'mesh':13}{'n':>4}  {'bending':9}{'tri':>7}{'dofs':>7}{'st':>4}{'its':>5}"
+    f"{'problem':26}{'mesh':13}{'n':>4}  {'method':9}{'tri':>7}{'dofs':>7}{'st':>4}{'its':>5}"
     f"{'s':>7}{'exact %':>9}{'K-L %':>9}{'Sze %':>9}{'sagit/h':>9}  at the largest load"
 )
 
@@ -94,12 +126,11 @@ def _largest(errors: dict[str, list[float]]) -> float:
     return max(float(np.abs(values).max()) for values in errors.values())
 
 
-def measure(name: str, mesh: str, n: int, bending: str) -> Row:
+def measure(name: str, mesh: str, n: int, method: str) -> Row:
     """Solve one problem on one mesh."""
-    make, _ = PROBLEMS[name]
     begin = time.perf_counter()
-    problem = make(n, shells.Form(mesh, bending))
-    row = Row(name, mesh, n, bending, problem.scene.sheet.num_cells_global, 0)
+    problem = PROBLEMS[name].make(n, shells.Form(mesh, **METHODS[method]))
+    row = Row(name, mesh, n, method, problem.scene.sheet.num_cells_global, 0)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MeshWarning)
@@ -119,7 +150,8 @@ def _fill(row: Row, problem: shells.ShellProblem, result: StaticResult) -> None:
     row.factorisations = sum(step.factorisations for step in steps)
     row.unstable = sum(bool(step.negative_pivots) for step in steps)
     row.result = {name: float(history[name][-1]) for name in problem.measures}
-    row.sagitta = sagitta(result.model)[0].value
+    if METHODS[row.method]["model"] == "ddg":
+        row.sagitta = sagitta(result.model)[0].value
     if problem.exact:
         row.errors["exact"] = _percent(problem.exact_errors(history, STOPS))
     for kind, stem in (("kirchhoff_love", "kirchhoff_love"), ("sze", "sze2004")):
@@ -133,19 +165,19 @@ def _percent(errors: dict[str, np.ndarray]) -> dict[str, list[float]]:
 
 
 def cases(options: argparse.Namespace) -> Iterator[tuple[str, str, int, str]]:
-    """Problems, meshes, sizes and forms that were asked for."""
+    """Problems, meshes, sizes and methods that were asked for."""
     for name in options.problem:
-        counts = PROBLEMS[name][1]
-        for bending in options.bending:
+        for method in options.method:
+            counts = PROBLEMS[name].counts[METHODS[method]["model"]]
             for mesh in options.mesh:
                 for n in options.n or (counts[:2] if options.quick else counts):
-                    yield name, mesh, n, bending
+                    yield name, mesh, n, method
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    for name, choices in (("problem", PROBLEMS), ("mesh", STRUCTURES), ("bending", BENDING)):
+    for name, choices in (("problem", PROBLEMS), ("mesh", STRUCTURES), ("method", METHODS)):
         every = list(choices)
         parser.add_argument(f"--{name}", nargs="+", choices=every, default=every)
     parser.add_argument("--n", nargs="+", type=int, help="segments (default: each problem's own)")

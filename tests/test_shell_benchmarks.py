@@ -81,7 +81,7 @@ def test_averaged_normals_on_the_hemisphere(structure, low, high):
 def test_the_command_prints_and_writes_what_it_found(tmp_path):
     script = Path(__file__).parents[1] / "benchmarks" / "shell_benchmarks.py"
     file = tmp_path / "table.json"
-    choice = "--problem hemisphere_18deg_hole --mesh unstructured --bending director --n 16"
+    choice = "--problem hemisphere_18deg_hole --mesh unstructured --method director --n 16"
     done = subprocess.run(
         [sys.executable, str(script), *choice.split(), "--output", str(file)],
         capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(script.parents[1])},
