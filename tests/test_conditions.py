@@ -7,13 +7,13 @@ import pytest
 from dolfinx import cpp
 from scenes import E, H, build, follow, strip_scene, tee, z_fold_scene
 
+from ufl_origami.crease_laws import LinearLaw
 from ufl_origami.errors import InputError, SceneError
 from ufl_origami.material import Material
 from ufl_origami.model import place_vertices
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import sheet_from_arrays
 from ufl_origami.solvers.newton import shift_weights
-from ufl_origami.terms.crease import LinearLaw
 
 pytestmark = pytest.mark.mpi
 

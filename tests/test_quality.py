@@ -23,9 +23,9 @@ from ufl_origami.quality import (
 )
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import sheet_from_arrays
+from ufl_origami.sides import edge_sides
 from ufl_origami.solvers.newton import NewtonSolver
 from ufl_origami.solvers.static import StaticPath, StepSettings
-from ufl_origami.stencils import edge_sides
 from ufl_origami.supports import check_supports, pieces
 
 NU = 0.3

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scenes import E, H, build, disturb, strip_scene, tee, z_fold_scene
 
+from ufl_origami.crease_laws import MomentLaw
 from ufl_origami.material import Material
 from ufl_origami.scene import Scene
-from ufl_origami.terms.crease import MomentLaw
 
 pytestmark = pytest.mark.mpi
 

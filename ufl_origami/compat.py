@@ -4,7 +4,7 @@ import logging
 
 import dolfinx
 import numpy as np
-from dolfinx import cpp, fem
+from dolfinx import cpp, fem, la
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 
@@ -37,3 +37,9 @@ def add_matrix(form: fem.Form, matrix) -> None:
     """Add a bilinear form to a PETSc matrix by its local-to-global map, entry by entry."""
     constants, coefficients = constants_and_coefficients(form)
     cpp.fem.petsc.assemble_matrix(matrix, form._cpp_object, constants, coefficients, [], True)
+
+
+def assemble_into(matrix: la.MatrixCSR, form: fem.Form) -> None:
+    """Assemble a bilinear form of one process into its own matrix."""
+    matrix.data[:] = 0.0
+    fem.assemble_matrix(matrix, form)  # type: ignore[arg-type]

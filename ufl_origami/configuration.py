@@ -1,5 +1,7 @@
 """Unknowns of a sheet and their numbering: 3 displacements a vertex, named scalars on edges.
 
+Displacements of the edges' midpoints, where a model has them, are three of these scalars.
+
 Each rank owns the contiguous range [3 x owned vertices | owned edge scalars] of the global
 vector. Locally the order is [3 x (owned, ghost) vertices | (owned, ghost) scalars], so that the
 first part is the array of a P1 vector function and any UFL form over it can be added as it is.
@@ -62,6 +64,10 @@ class State:
     def scalars(self) -> np.ndarray:
         """Edge unknowns (ns,): virtual fold angles and directors, radians."""
         return self.q[3 * len(self.x) :]
+
+
+MIDDLE = ("middle_x", "middle_y", "middle_z")
+"""Edge unknowns that are the displacement of the edge's midpoint, in models of second order."""
 
 
 class Configuration:
@@ -133,6 +139,16 @@ class Configuration:
     def edge_unknowns(self) -> tuple[str, ...]:
         """Names of the edge unknowns, in the order of their numbering."""
         return tuple(self._slots)
+
+    @property
+    def has_midpoints(self) -> bool:
+        """Whether the edges' midpoints move on their own."""
+        return MIDDLE[0] in self._slots
+
+    def middle_dofs(self, facets: np.ndarray) -> np.ndarray:
+        """Local unknowns (..., 3) of the midpoints of local facets (...,)."""
+        slots = [self.slot(name)[facets] for name in MIDDLE]
+        return 3 * self.nv + np.stack(slots, axis=-1)
 
     def to_local(self, vector: PETSc.Vec) -> np.ndarray:
         """Owned and ghost values (num_local,) of a global vector."""

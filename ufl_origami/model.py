@@ -1,27 +1,47 @@
-"""The discrete DDG model of a scene: unknowns, terms, constraints, and what it can measure."""
+"""The discrete model of a scene: unknowns, terms, constraints, and what it can measure."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from petsc4py import PETSc
 
 import numpy as np
 
 from ufl_origami.configuration import Configuration, State, gather_marks
-from ufl_origami.creases import EdgeFan, mesh_angles
 from ufl_origami.problem import Problem
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import SheetMesh
-from ufl_origami.terms.crease import CreaseEdges
-from ufl_origami.terms.shell import ShellTerm
+from ufl_origami.sides import EdgeFan
 
 
-@dataclass(frozen=True)
-class CreaseModel:
+class CreaseModel(Protocol):
     """Edges of a crease and the spring between its first declared pair of panels."""
 
-    fan: EdgeFan
-    spring: CreaseEdges
-    sides: tuple[int, int]
+    @property
+    def fan(self) -> EdgeFan:
+        """Edges of the crease on this rank."""
+
+    def virtual_angle(self, state: State) -> np.ndarray:
+        """Mean virtual fold angle (n,) of each edge (radians)."""
+
+    def mesh_angle(self, state: State) -> np.ndarray:
+        """Dihedral angle (n,) of the triangles at each edge's middle, near the virtual one."""
+
+
+class PanelTerm(Protocol):
+    """What a model asks of the term of its panels, whatever the discretisation."""
+
+    def element_energies(self, state: State) -> dict[str, np.ndarray]:
+        """Energy of each owned triangle (num_owned_cells,), by kind."""
+
+    def clamped_sides(self) -> np.ndarray:
+        """Sides 3 * cell + e of owned triangles at which the normal is prescribed."""
+
+    def largest_tilt(self, state: State) -> float:
+        """Largest |tilt| (radians) of this rank's triangles."""
+
+    def smallest_area_ratio(self, state: State) -> float:
+        """Smallest ratio of current to rest area of this rank's triangles."""
 
 
 @dataclass
@@ -41,7 +61,7 @@ class Model:
     sheet: SheetMesh
     configuration: Configuration
     problem: Problem
-    shell: ShellTerm
+    shell: PanelTerm
     creases: dict[str, CreaseModel]
     x: PETSc.Vec
     scene: Scene
@@ -64,10 +84,9 @@ class Model:
         """Sum (3,) over a named edge set's vertices of the forces that the supports exert."""
         forces = self.x.duplicate()
         self.problem.forces(self.x, forces)
-        vertices = place_vertices(self.sheet, name)
-        vertices = vertices[vertices < self.configuration.nv_owned]
-        local = forces.array_r[: 3 * self.configuration.nv_owned].reshape(-1, 3)
-        return self.configuration.sum(local[vertices].sum(axis=0))
+        dofs = place_nodes(self.configuration, name).dofs
+        owned = [self.configuration.owned_dofs(column) for column in dofs.T]
+        return self.configuration.sum([forces.array_r[part].sum() for part in owned])
 
     def position(self, point: str) -> np.ndarray:
         """Current position (3,) of a named point."""
@@ -84,8 +103,7 @@ class Model:
         crease = self.creases[name]
         state, fan = self.state, crease.fan
         ends = self.sheet.edge_vertices()[fan.facets]
-        virtual = crease.spring.angle(state.scalars)
-        mesh = mesh_angles(self.sheet, fan, crease.sides, state.x, virtual)
+        virtual, mesh = crease.virtual_angle(state), crease.mesh_angle(state)
         middle = self.sheet.rest[ends].mean(axis=1)
         return FoldAngles(middle, fan.length, virtual, mesh)
 
@@ -125,3 +143,39 @@ def place_vertices(sheet: SheetMesh, name: str) -> np.ndarray:
     else:
         here = sheet.edge_vertices()[sheet.edge_facets(name)]
     return gather_marks(sheet.V.dofmap.index_map, np.unique(here))
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Nodes of a named place on this rank, ghosts included.
+
+    Attributes:
+        dofs: (n, 3) local unknowns of their displacements.
+        rest: (n, 3) rest positions.
+    """
+
+    dofs: np.ndarray
+    rest: np.ndarray
+
+
+def place_nodes(configuration: Configuration, name: str) -> Nodes:
+    """Vertices and, where they move on their own, midpoints of a named place; collective."""
+    sheet = configuration.sheet
+    vertices = place_vertices(sheet, name)
+    dofs, rest = 3 * vertices[:, None] + np.arange(3), sheet.rest[vertices]
+    if configuration.has_midpoints:
+        facets = place_facets(sheet, name)
+        middle = sheet.rest[sheet.edge_vertices()[facets]].mean(axis=1)
+        dofs = np.vstack([dofs, configuration.middle_dofs(facets)])
+        rest = np.vstack([rest, middle])
+    return Nodes(dofs, rest)
+
+
+def place_facets(sheet: SheetMesh, name: str) -> np.ndarray:
+    """Local edges, ghosts included, of a named edge set or panel, none of a point; collective."""
+    if name in sheet.points:
+        return np.empty(0, dtype=np.int64)
+    if name not in sheet.panel_names:
+        return sheet.edge_facets(name)
+    here = np.unique(sheet.cell_edges[sheet.panel_cells(name)])
+    return gather_marks(sheet.mesh.topology.index_map(1), here)

@@ -44,15 +44,10 @@ def energy_densities(model: Model) -> dict[str, np.ndarray]:
 
     The membrane's are left out where the scene computes them by a UFL form.
     """
-    shell, state = model.shell, model.state
-    shell.energies(state)
-    density = np.zeros((model.sheet.num_owned_cells, 2))
-    for batch in shell.batches:
-        abar = batch.elastic.abar
-        area = 0.5 * np.sqrt(abar[:, 0] * abar[:, 2] - abar[:, 1] ** 2)
-        density[batch.table.cells] = batch.energy / area[:, None]
-    kinds = dict(zip(shell.kinds, density.T, strict=True))
-    return {k: v for k, v in kinds.items() if k == "bending" or model.scene.membrane == "kernel"}
+    corners = model.sheet.rest[model.sheet.cells[: model.sheet.num_owned_cells]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(normal, axis=1)
+    return {k: v / area for k, v in model.shell.element_energies(model.state).items()}
 
 
 class FieldWriter:

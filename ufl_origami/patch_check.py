@@ -21,7 +21,7 @@ import numpy as np
 from ufl_origami.collective import binned
 from ufl_origami.mesh_checks import triangle_normals
 from ufl_origami.sheet import SheetMesh
-from ufl_origami.stencils import EdgeSides, crease_facets
+from ufl_origami.sides import EdgeSides, crease_facets
 
 #: Directions of the cylinders tried, over half a turn.
 DIRECTIONS = 72

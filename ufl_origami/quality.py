@@ -36,7 +36,8 @@ from ufl_origami.model import Model
 from ufl_origami.patch_check import patch_errors
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import SheetMesh
-from ufl_origami.stencils import EdgeSides, edge_sides
+from ufl_origami.sides import EdgeSides, edge_sides
+from ufl_origami.terms.shell import ShellTerm
 
 #: Largest relative error of the bending energy in the patch check.
 PATCH_LIMIT = 0.02
@@ -100,6 +101,8 @@ def check_mesh(scene: Scene, sides: EdgeSides | None = None) -> list[Finding]:
     """
     sheet = scene.sheet
     findings = _altitude_findings(sheet)
+    if scene.model == "fem":
+        return findings
     if scene.bending == "averaged":
         return findings + _patch_findings(scene, sides or edge_sides(sheet))
     return findings + _long_edge_findings(sheet)
@@ -107,6 +110,8 @@ def check_mesh(scene: Scene, sides: EdgeSides | None = None) -> list[Finding]:
 
 def check_model(model: Model) -> list[Finding]:
     """Figures of the model's current state that are beyond their limits; collective."""
+    if not isinstance(model.shell, ShellTerm):  # the FEM shell does not lock
+        return []
     worst, share = sagitta(model)
     if not worst.value > SAGITTA_LIMIT:
         return []
@@ -138,6 +143,8 @@ def sagitta(model: Model) -> tuple[Worst, float]:
     Collective. The curvature is that of the shell's own second fundamental form: the largest
     eigenvalue in size of Abar^-1 B.
     """
+    if not isinstance(model.shell, ShellTerm):
+        raise TypeError("sagitta: the model is not made of mid-edge shells")
     sheet, value = model.sheet, np.zeros(model.sheet.num_owned_cells)
     area = np.zeros(len(value))
     thickness = model.shell.panels.thickness

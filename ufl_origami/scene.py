@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ufl_origami.configuration import Configuration
+from ufl_origami.crease_laws import CreaseLaw
 from ufl_origami.errors import SceneError
 from ufl_origami.material import Material
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.stencils import BENDING_FORMS
 from ufl_origami.terms.base import Term
-from ufl_origami.terms.crease import CreaseLaw
 from ufl_origami.terms.form import SheetFunctions
 
 TimeFunction = Callable[[float], float]
@@ -78,6 +78,11 @@ class CreaseSpec:
     stiffness: Scalar
     rest_angle: Scalar | None
     pair: Pair | None
+
+    @property
+    def stiff(self) -> bool:
+        """Whether the fold is held (infinite stiffness) instead of sprung."""
+        return self.law is None and not callable(self.stiffness) and bool(np.isinf(self.stiffness))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ import numpy as np
 
 from ufl_origami.configuration import Configuration, cells_per_edge
 from ufl_origami.sheet import SheetMesh
+from ufl_origami.sides import EdgeSides, crease_facets, edge_sides
 
 FOLD_ANGLE, DIRECTOR = "fold_angle", "director"
 BENDING_FORMS = ("director", "averaged")
@@ -31,44 +32,6 @@ BENDING_FORMS = ("director", "averaged")
 def fold_angle_name(pair: int) -> str:
     """Unknown of the virtual angle between panel 1 and panel `pair` + 1 of a crease (from 1)."""
     return FOLD_ANGLE if pair == 1 else f"{FOLD_ANGLE}_{pair}"
-
-
-@dataclass(frozen=True)
-class EdgeSides:
-    """Triangle-edge pairs ("sides") of all local cells, flattened as 3 * cell + e.
-
-    Attributes:
-        facet: local facet of each side (3 nc,).
-        rank: position among the sides of its facet, ordered by panel, then input cell.
-        partner: side 0 of the facet, or side 1 seen from side 0 (-1: no other side).
-        count: sides of the facet, as its owner counts them.
-        consistent: +1 where the partner runs along the edge the other way, else -1.
-    """
-
-    facet: np.ndarray
-    rank: np.ndarray
-    partner: np.ndarray
-    count: np.ndarray
-    consistent: np.ndarray
-
-
-def edge_sides(sheet: SheetMesh) -> EdgeSides:
-    """Pair up the sides of all local facets, in an order that no partition changes."""
-    facet = sheet.cell_edges.ravel()
-    panel, cell = np.repeat(sheet.cell_panel, 3), np.repeat(sheet.input_cell, 3)
-    order = np.lexsort((cell, panel, facet))
-    local_count = np.bincount(facet)
-    start = np.concatenate(([0], np.cumsum(local_count)))
-    rank = np.empty_like(facet)
-    rank[order] = np.arange(len(facet)) - start[facet[order]]
-    has_partner = local_count[facet] > 1
-    partner = np.full(len(facet), -1)
-    seen = np.where(rank == 0, start[facet] + 1, start[facet])[has_partner]
-    partner[has_partner] = order[seen]
-    first = np.roll(sheet.cells, -1, axis=1).ravel()
-    second = np.roll(sheet.cells, -2, axis=1).ravel()
-    consistent = np.where(first == second[partner], 1, -1)
-    return EdgeSides(facet, rank, partner, cells_per_edge(sheet)[facet], consistent)
 
 
 @dataclass
@@ -99,12 +62,6 @@ class ShellBatch:
         position[:, 3:][self.c == 0] = -1
         slots = np.where(self.slot >= 0, 3 * configuration.nv + self.slot, -1)
         return np.hstack([position.reshape(n, 18), slots.reshape(n, -1)]).astype(np.int32)
-
-
-def crease_facets(sheet: SheetMesh) -> np.ndarray:
-    """Local facets (owned and ghosts) of all creases, sorted."""
-    parts = [sheet.edges[name] for name in sheet.creases]
-    return np.unique(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int32)
 
 
 def edge_unknowns(sheet: SheetMesh, bending: str, clamped: np.ndarray) -> dict[str, np.ndarray]:

@@ -18,10 +18,10 @@ from scipy.sparse import csgraph
 
 from ufl_origami.collective import binned, reduced
 from ufl_origami.configuration import spread
-from ufl_origami.creases import side_ends
 from ufl_origami.errors import SceneError, SupportWarning
 from ufl_origami.model import Model
 from ufl_origami.sheet import SheetMesh
+from ufl_origami.sides import side_ends
 
 #: Rigid motions that the conditions resist less than this, of the largest, are free.
 FREE = 1e-10
@@ -141,14 +141,7 @@ def _displacement_rows(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 def _clamp_rows(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """One vertex and the unit tangent (n, 3) of each clamped edge of owned cells."""
-    sides = [
-        3 * batch.table.cells[ghosts.rows] + ghosts.edges
-        for batch in model.shell.batches
-        for ghosts in batch.ghosts
-    ]
-    if not sides:
-        return np.empty(0, dtype=np.int64), np.empty((0, 3))
-    ends = side_ends(model.sheet, np.concatenate(sides))
+    ends = side_ends(model.sheet, model.shell.clamped_sides())
     edge = model.sheet.rest[ends[:, 1]] - model.sheet.rest[ends[:, 0]]
     return ends[:, 0], edge / np.linalg.norm(edge, axis=1)[:, None]
 

@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 
+from petsc4py import PETSc
+
 import numpy as np
 import ufl
 from dolfinx import fem
 from ufl.domain import extract_unique_domain
 
 from ufl_origami import compat
-from ufl_origami.configuration import State
+from ufl_origami.configuration import Configuration, State
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.terms.base import MatrixTerm
 
@@ -21,22 +23,41 @@ class SheetFunctions:
 
     Attributes:
         sheet: the meshed sheet (rest state).
-        u: displacement, P1 vector function.
+        u: displacement, vector function: P1, or P2 where the edges' midpoints move on their own.
         time: load factor or time, a constant.
+        dofs: local unknown of each degree of freedom of u.
+        lgmap: global unknowns of them, None where they are the first local unknowns.
     """
 
     sheet: SheetMesh
     u: fem.Function
     time: fem.Constant
+    dofs: np.ndarray
+    lgmap: PETSc.LGMap | None = None
 
     @classmethod
-    def create(cls, sheet: SheetMesh) -> "SheetFunctions":
-        """Fresh displacement and time for a sheet."""
-        return cls(sheet, fem.Function(sheet.V), fem.Constant(sheet.mesh, np.float64(0.0)))
+    def create(cls, configuration: Configuration) -> "SheetFunctions":
+        """Fresh displacement and time for a numbering of the unknowns."""
+        sheet = configuration.sheet
+        time = fem.Constant(sheet.mesh, np.float64(0.0))
+        if not configuration.has_midpoints:
+            return cls(sheet, fem.Function(sheet.V), time, np.arange(3 * configuration.nv))
+        u = fem.Function(fem.functionspace(sheet.mesh, ("Lagrange", 2, (3,))))
+        nodes = u.function_space.dofmap.list
+        dofs = np.empty((len(u.x.array) // 3, 3), dtype=np.int64)
+        dofs[nodes[:, :3]] = 3 * sheet.cells[:, :, None] + np.arange(3)
+        dofs[nodes[:, 3:]] = configuration.middle_dofs(sheet.cell_edges)
+        ids = configuration.global_ids[dofs.ravel()]
+        return cls(sheet, u, time, dofs.ravel(), PETSc.LGMap().create(ids, comm=sheet.comm))
+
+    @property
+    def V(self) -> fem.FunctionSpace:
+        """Space of the displacement."""
+        return self.u.function_space
 
     def set(self, state: State) -> None:
         """Copy a state into the functions."""
-        self.u.x.array[:] = state.q[: 3 * len(state.x)]
+        self.u.x.array[:] = state.q[self.dofs]
         self.time.value = state.time
 
     def piecewise(self, values: np.ndarray) -> fem.Function:
@@ -92,11 +113,17 @@ class FormTerm(MatrixTerm):
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the assembled linear form to the displacement part of the local values."""
         self.functions.set(state)
-        compat.add_vector(self._residual, out[: 3 * len(state.x)])
+        part = np.zeros(len(self.functions.dofs))
+        compat.add_vector(self._residual, part)
+        out[self.functions.dofs] += part
 
     def add_tangent(self, state: State, matrix) -> None:
         """Add the assembled derivative of the linear form; nothing for a linear energy."""
         if self._tangent is None:
             return
         self.functions.set(state)
+        usual = matrix.getLGMap()
+        if self.functions.lgmap is not None:
+            matrix.setLGMap(self.functions.lgmap, self.functions.lgmap)
         compat.add_matrix(self._tangent, matrix)
+        matrix.setLGMap(*usual)

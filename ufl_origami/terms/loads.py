@@ -20,18 +20,18 @@ VectorFunction = Callable[[float], np.ndarray]
 
 
 class NodalLoad(Term):
-    """Dead forces on vertices: -f(t) . sum_a w_a u_a.
+    """Dead forces on nodes: -f(t) . sum_a w_a u_a.
 
     Args:
-        vertices: local vertices (n,), owned or ghost; contributions of all ranks add up.
-        weights: (n,) share of each vertex (1 for a point, length for a line load).
+        dofs: local unknowns (n, 3) of nodes, owned or ghost; contributions of all ranks add up.
+        weights: (n,) share of each node (1 for a point, length for a line load).
         force: function of time: force (3,), per length for a line load.
     """
 
     kinds = ("load",)
 
-    def __init__(self, vertices: np.ndarray, weights: np.ndarray, force: VectorFunction):
-        self._vertices, self._weights, self._force = vertices, weights, force
+    def __init__(self, dofs: np.ndarray, weights: np.ndarray, force: VectorFunction):
+        self._dofs, self._weights, self._force = dofs, weights, force
         self._time = 0.0
 
     def set_time(self, time: float) -> None:
@@ -43,13 +43,11 @@ class NodalLoad(Term):
 
     def energies(self, state: State) -> np.ndarray:
         """Minus the work of the forces on this rank's share."""
-        u = state.q[: 3 * len(state.x)].reshape(-1, 3)
-        return np.array([-(self._forces() * u[self._vertices]).sum()])
+        return np.array([-(self._forces() * state.q[self._dofs]).sum()])
 
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Subtract the forces."""
-        forces = out[: 3 * len(state.x)].reshape(-1, 3)
-        np.add.at(forces, self._vertices, -self._forces())
+        np.add.at(out, self._dofs, -self._forces())
 
 
 def area_load(functions: SheetFunctions, density: np.ndarray, direction: VectorFunction):
@@ -76,7 +74,7 @@ def follower_pressure(functions: SheetFunctions, density: np.ndarray, pressure: 
     rest, current = deformed_jacobian(functions.u)
     area = ufl.sqrt(ufl.inner(*(2 * [ufl.cross(rest[:, 0], rest[:, 1])])))
     normal = ufl.cross(current[:, 0], current[:, 1]) / area
-    v = ufl.TestFunction(functions.sheet.V)
+    v = ufl.TestFunction(functions.V)
     p = functions.piecewise(density)
     return _TimedForm(
         functions,

@@ -110,6 +110,7 @@ class ShellTerm(StencilTerm):
     ):
         self._measure = kernels.MEASURES[measure]
         self._input_cell = configuration.sheet.input_cell
+        self._num_cells = configuration.sheet.num_owned_cells
         self.panels = panels
         self.batches = [_Batch(table, ghosts, configuration) for table, ghosts in batches]
         for batch in self.batches:
@@ -133,6 +134,28 @@ class ShellTerm(StencilTerm):
             kernels.shell_energy(state.x, batch.stencil.verts, batch.s, batch.elastic, batch.energy)
             total += batch.energy.sum(axis=0)
         return total
+
+    def element_energies(self, state: State) -> dict[str, np.ndarray]:
+        """Energy of each owned triangle (num_owned_cells,), by kind."""
+        self.energies(state)
+        values = np.zeros((self._num_cells, 2))
+        for batch in self.batches:
+            values[batch.table.cells] = batch.energy
+        membrane, bending = values.T
+        return (
+            {"membrane": membrane, "bending": bending}
+            if self.panels.membrane
+            else {"bending": bending}
+        )
+
+    def clamped_sides(self) -> np.ndarray:
+        """Sides 3 * cell + e of owned triangles at which the normal is prescribed."""
+        sides = [
+            3 * batch.table.cells[ghosts.rows] + ghosts.edges
+            for batch in self.batches
+            for ghosts in batch.ghosts
+        ]
+        return np.concatenate([np.empty(0, dtype=np.int64), *sides])
 
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the energy's gradient."""
