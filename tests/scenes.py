@@ -25,19 +25,23 @@ def follow(model, stops=(1.0,), *, first=0.125, newton=None, on_accept=None):
     return path
 
 
-def z_fold_scene(size, eta, *, nu=0.0, bending="director", d1=1.0, **mesh):
+def z_fold_scene(size, eta, *, nu=0.0, d1=1.0, bending="director", model="ddg", **mesh):
     """The paper's Z-fold pulled apart by d1 at load factor 1."""
-    scene = Scene(mesh_pattern(z_fold(), size, **mesh), Material(E, nu, H), bending=bending)
+    sheet = mesh_pattern(z_fold(), size, **mesh)
+    scene = Scene(sheet, Material(E, nu, H), bending=bending, model=model)
     scene.crease("crease", eta * E * H**3)
     scene.fix("left_edge")
     scene.move("right_edge", x=d1, y=0.0, z=0.0)
     return scene
 
 
-def strip_scene(n=(16, 2), *, h=0.1, nu=0.0, bending="director", structure="structured"):
+def strip_scene(
+    n=(16, 2), *, h=0.1, nu=0.0, structure="structured", bending="director", model="ddg"
+):
     """Cantilever of Sze, Liu & Lo (2004): L = 10, b = 1, EI = 100, clamped at x = 0."""
     sheet = rectangle(10.0, 1.0, n=n, structure=structure)
-    scene = Scene(sheet, Material(1.2e6 * (0.1 / h) ** 3, nu, h), bending=bending)
+    material = Material(1.2e6 * (0.1 / h) ** 3, nu, h)
+    scene = Scene(sheet, material, bending=bending, model=model)
     scene.fix("x0")
     scene.clamp("x0")
     return scene
