@@ -43,7 +43,7 @@ def build_fem(scene: Scene) -> Model:
     angles = {name: rest_fold_angles(sheet, fan, rest) for name, fan in fans.items()}
     x = rest_vector(configuration, fans, angles)
     n = sheet.num_owned_cells
-    elements = flat_elements(rest[:n, :3], np.isin(sheet.cell_edges[:n], clamped))
+    elements = flat_elements(rest[:n, :3], ~np.isin(sheet.cell_edges[:n], clamped))
     shell = FemShellTerm(
         configuration,
         elements,

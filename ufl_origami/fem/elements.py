@@ -17,6 +17,10 @@ GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 """Points of the two-point rule along an edge of unit length."""
 
 
+FREE, HELD = 0, 1
+"""Kinds of sides."""
+
+
 @dataclass(frozen=True)
 class FlatElements:
     """Broken mesh and spaces of n triangles; element c has the nodes 6 c .. 6 c + 5.
@@ -30,8 +34,7 @@ class FlatElements:
         S: symmetric tensors, P1: components 11, 12, 22 at the corners.
         S0: symmetric tensors, constant.
         V0: vectors in space, constant.
-        sides: sides by kind as UFL takes them, (kind, flat pairs of element and local edge): kind 0
-            are all without prescribed normal, 1, 2, 3 those with one on local edge 0, 1, 2.
+        sides: sides by kind as UFL takes them, (kind, flat pairs of element and local edge).
     """
 
     corners: np.ndarray
@@ -50,12 +53,12 @@ class FlatElements:
         return np.roll(self.corners, -2, axis=1) - np.roll(self.corners, -1, axis=1)
 
 
-def flat_elements(positions: np.ndarray, clamped: np.ndarray) -> FlatElements:
+def flat_elements(positions: np.ndarray, free: np.ndarray) -> FlatElements:
     """Lay triangles flat.
 
     Args:
         positions: corners in space (n, 3, 3).
-        clamped: (n, 3) whether the normal at an edge is prescribed.
+        free: (n, 3) whether a side is of kind FREE, else it is HELD.
     """
     corners, frame = laid_flat(positions)
     n = len(corners)
@@ -71,10 +74,10 @@ def flat_elements(positions: np.ndarray, clamped: np.ndarray) -> FlatElements:
         basix.ufl.element("DG", "triangle", degree, shape=(2, 2), symmetry=True)
         for degree in (1, 0)
     )
-    free = np.column_stack(np.nonzero(~clamped))
-    held = [np.flatnonzero(clamped[:, e]) for e in range(3)]
-    pairs = [free, *(np.column_stack([c, np.full(len(c), e)]) for e, c in enumerate(held))]
-    sides = [(kind, pair.astype(np.int32).ravel()) for kind, pair in enumerate(pairs)]
+    sides = [
+        (kind, np.argwhere(where).astype(np.int32).ravel())
+        for kind, where in ((FREE, free), (HELD, ~free))
+    ]
     return FlatElements(
         corners,
         frame,
@@ -86,6 +89,13 @@ def flat_elements(positions: np.ndarray, clamped: np.ndarray) -> FlatElements:
         fem.functionspace(broken, ("DG", 0, (3,))),
         sides,
     )
+
+
+def side_elements(positions: np.ndarray, edges: np.ndarray) -> FlatElements:
+    """Lay triangles (n, 3, 3) flat of which one side, local edge (n,), is of kind FREE each."""
+    free = np.zeros((len(edges), 3), dtype=bool)
+    free[np.arange(len(edges)), edges] = True
+    return flat_elements(positions, free)
 
 
 def laid_flat(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

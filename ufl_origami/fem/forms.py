@@ -24,7 +24,7 @@ import ufl
 from dolfinx import fem
 
 from ufl_origami import compat
-from ufl_origami.fem.elements import FlatElements
+from ufl_origami.fem.elements import FREE, HELD, FlatElements
 
 JIT_OPTIONS = {"timeout": 300}
 EDGE_DEGREE, CELL_DEGREE = 3, 2
@@ -86,13 +86,11 @@ class Positions:
 
     Attributes:
         x, rest, base: P2 vector functions.
-        outward: constant vectors by local edge, the prescribed outward tangents of clamped edges.
     """
 
     x: fem.Function
     rest: fem.Function
     base: fem.Function
-    outward: tuple[fem.Function, ...]
 
 
 def cells(elements: FlatElements) -> ufl.Measure:
@@ -109,18 +107,23 @@ def edges(elements: FlatElements, *kinds: int) -> ufl.Measure:
     return measure(kinds)
 
 
-def angle_pairing(elements: FlatElements, at: Positions, moment):
-    """Integral of the edge angle times the moment's normal component.
-
-    At a clamped edge the angle is measured from the prescribed normal, mu x t.
-    """
+def normal_part(elements: FlatElements, moment):
+    """Normal component of a moment on the sides."""
     n = ufl.FacetNormal(elements.mesh)
-    normal_moment, t, nu = ufl.dot(n, ufl.dot(moment, n)), edge_tangent(at.x), normal(at.x)
-    form = turned(t, carried(at.x, at.base), nu) * normal_moment * edges(elements, 0)
-    for i, outward in enumerate(at.outward):
-        if len(elements.sides[1 + i][1]):
-            form += turned(t, ufl.cross(outward, t), nu) * normal_moment * edges(elements, 1 + i)
-    return form
+    return ufl.dot(n, ufl.dot(moment, n))
+
+
+def angle_pairing(elements: FlatElements, at: Positions, moment):
+    """Integral over free sides of the angle times the moment's normal component."""
+    angle = turned(edge_tangent(at.x), carried(at.x, at.base), normal(at.x))
+    return angle * normal_part(elements, moment) * edges(elements, FREE)
+
+
+def clamp_pairing(elements: FlatElements, x, outward, moment):
+    """The same for sides on which the angle is measured from a prescribed normal, outward x t."""
+    t = edge_tangent(x)
+    angle = turned(t, ufl.cross(outward, t), normal(x))
+    return angle * normal_part(elements, moment) * edges(elements, FREE)
 
 
 def curvature_pairing(elements: FlatElements, at: Positions, moment):
@@ -133,7 +136,7 @@ def edge_strain_pairing(elements: FlatElements, at: Positions, weight):
     n = ufl.FacetNormal(elements.mesh)
     t = ufl.as_vector((-n[1], n[0]))
     strain = green_strain(at.x, at.rest)
-    every = edges(elements, 0, 1, 2, 3)
+    every = edges(elements, FREE, HELD)
     return ufl.dot(t, ufl.dot(strain, t)) * ufl.dot(t, ufl.dot(weight, t)) * every
 
 

@@ -9,7 +9,7 @@ from dolfinx import fem
 from ufl_origami.conditions import outward_tangents
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.fem import forms
-from ufl_origami.fem.elements import GAUSS, flat_elements
+from ufl_origami.fem.elements import FREE, GAUSS, side_elements
 from ufl_origami.fem.shell import FemShellTerm
 from ufl_origami.fem.unknowns import node_dofs
 from ufl_origami.partition import pair_keys
@@ -46,16 +46,14 @@ class FemEdgeMoment(StencilTerm):
         ends = side_ends(sheet, sides)
         self._length = np.linalg.norm(sheet.rest[ends[:, 1]] - sheet.rest[ends[:, 0]], axis=1)
         positions = sheet.rest[sheet.cells[self._cells]]
-        loaded = np.zeros((len(sides), 3), dtype=bool)
-        loaded[np.arange(len(sides)), edges] = True
-        elements = flat_elements(positions, ~loaded)
+        elements = side_elements(positions, edges)
         self._x, self._base = fem.Function(elements.P), fem.Function(elements.P)
         outward = fem.Function(elements.V0)
         outward.x.array[:] = outward_tangents(sheet, sides).ravel()
         angle = forms.frame_angle(elements, self._x, self._base, outward)
         weight = ufl.TestFunction(fem.functionspace(elements.mesh, ("DG", 1)))
-        self._angle = forms.compiled(angle * weight * forms.edges(elements, 0))
-        total = angle * forms.edges(elements, 0)
+        self._angle = forms.compiled(angle * weight * forms.edges(elements, FREE))
+        total = angle * forms.edges(elements, FREE)
         force = ufl.derivative(total, self._x, ufl.TestFunction(elements.P))
         self._force = forms.compiled(force)
         stiffness = ufl.derivative(force, self._x, ufl.TrialFunction(elements.P))
@@ -76,7 +74,7 @@ class FemEdgeMoment(StencilTerm):
 
     def _place(self, state: State) -> None:
         self._x.x.array[:] = self._shell.positions(state)[self._cells].ravel()
-        self._base.x.array[:] = self._shell.base[self._cells].ravel()
+        self._base.x.array[:] = self._shell.pairings.base[self._cells].ravel()
 
     def _rotations(self, state: State) -> np.ndarray:
         """Rotations (n, 2) of the directors at the Gauss points, near those accepted last."""

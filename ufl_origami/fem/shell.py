@@ -7,8 +7,8 @@ import numpy as np
 
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.fem import algebra
-from ufl_origami.fem.elements import FlatElements
-from ufl_origami.fem.pairings import Pairings
+from ufl_origami.fem.elements import FlatElements, side_elements
+from ufl_origami.fem.pairings import ClampPairings, Pairings
 from ufl_origami.fem.unknowns import TiltTable, node_dofs
 from ufl_origami.terms.base import Keyed, StencilTerm
 from ufl_origami.terms.panels import PanelData
@@ -59,7 +59,7 @@ class FemShellTerm(StencilTerm):
     ):
         sheet = configuration.sheet
         n = sheet.num_owned_cells
-        self.panels, self.clamps, self.table = panels, clamps, table
+        self.panels, self.table = panels, table
         self._input_cell = sheet.input_cell[:n]
         self._nodes = node_dofs(configuration)[:n]
         self._rest_nodes = rest_nodes(configuration)[:n]
@@ -67,7 +67,8 @@ class FemShellTerm(StencilTerm):
         angles = np.where(table.slot.reshape(n, 12) >= 0, used, -1)
         self._dofs = np.hstack([self._nodes.reshape(n, 18), angles]).astype(np.int32)
         self._scatter = np.maximum(self._dofs, 0)
-        self.pairings = Pairings(elements, self._rest_nodes)
+        self._set_clamps(clamps)
+        self.pairings = Pairings(elements, self._rest_nodes, self._clamp_pairings)
         h = panels.thickness[:n]
         stiffness = algebra.plane_stress(panels.young[:n], panels.poisson[:n])
         self._bend = algebra.bending_matrix(elements, (h**3 / 12)[:, None, None] * stiffness)
@@ -76,15 +77,23 @@ class FemShellTerm(StencilTerm):
         self._point_values = np.linalg.pinv(self._weights)
         coefficient = table.coefficient.reshape(n, 12)
         self._angle_rate = np.repeat(self._weights, 2, axis=2) * coefficient[:, None, :]
-        self._clamped = np.zeros((n, 3), dtype=bool)
-        for sides in clamps:
-            self._clamped[sides.cells, sides.edges] = True
         self.offset = np.zeros((n, 6))
         self._natural = np.zeros((n, 9))
         self._set_rest(rest, elements)
         self._moment, self._force = np.zeros((n, 9)), np.zeros((n, 12))
         self._last: _Linearisation | None = None
         self.linearise(None, rest)
+
+    def _set_clamps(self, clamps: list[ClampedSides]) -> None:
+        n = len(self._rest_nodes)
+        self.clamps, self._clamped = clamps, np.zeros((n, 3), dtype=bool)
+        cells = np.concatenate([np.empty(0, dtype=int), *(sides.cells for sides in clamps)])
+        edges = np.concatenate([np.empty(0, dtype=int), *(sides.edges for sides in clamps)])
+        self._clamped[cells, edges] = True
+        self._clamp_pairings = None
+        if len(cells):
+            elements = side_elements(self._rest_nodes[cells, :3], edges)
+            self._clamp_pairings = ClampPairings(elements, cells)
 
     def _set_rest(self, rest: State, elements: FlatElements) -> None:
         """Adopt a state as stress-free: its tilts and curvatures, and those of the panels."""
@@ -108,13 +117,8 @@ class FemShellTerm(StencilTerm):
         """Current nodes (n, 6, 3)."""
         return self._rest_nodes + state.q[self._nodes]
 
-    @property
-    def base(self) -> np.ndarray:
-        """Nodes (n, 6, 3) of the state whose normals the angles are measured from."""
-        return self.pairings.at.base.x.array.reshape(-1, 6, 3)
-
     def _place(self, state: State) -> None:
-        self.pairings.place(self.pairings.at.x, self.positions(state))
+        self.pairings.place(self.positions(state))
 
     def _angles(self) -> np.ndarray:
         """Angles (n, 6) of the normals at the edges' Gauss points against their frames."""
@@ -136,11 +140,9 @@ class FemShellTerm(StencilTerm):
 
     def set_time(self, time: float) -> None:
         """Set the prescribed normals."""
-        for sides in self.clamps:
-            tangents = sides.tangent(time)
-            for e, function in enumerate(self.pairings.at.outward):
-                here = sides.edges == e
-                function.x.array.reshape(-1, 3)[sides.cells[here]] = tangents[here]
+        if self._clamp_pairings:
+            tangents = np.concatenate([sides.tangent(time) for sides in self.clamps])
+            self._clamp_pairings.outward.x.array[:] = tangents.ravel()
 
     def energies(self, state: State) -> np.ndarray:
         """Membrane and bending energy of this rank's triangles."""
@@ -211,12 +213,12 @@ class FemShellTerm(StencilTerm):
         """Measure the angles from this state's normals from now on."""
         self._place(state)
         self.offset += np.where(np.repeat(self._clamped, 2, axis=1), 0.0, self._angles())
-        self.pairings.place(self.pairings.at.base, self.positions(state))
+        self.pairings.base = self.positions(state)
         self._last = None
 
     def history(self) -> dict[str, Keyed]:
         """Angles (n, 6) of the base state against the rest state's, and its nodes (n, 18)."""
-        base = self.pairings.at.base.x.array.reshape(-1, 18)
+        base = self.pairings.base.reshape(-1, 18).copy()
         return {
             "angle": Keyed(self._input_cell, self.offset),
             "base": Keyed(self._input_cell, base),
@@ -225,7 +227,7 @@ class FemShellTerm(StencilTerm):
     def restore(self, values: dict[str, np.ndarray]) -> None:
         """Measure the angles from the base state of an earlier run."""
         self.offset[:] = values["angle"]
-        self.pairings.at.base.x.array[:] = values["base"].ravel()
+        self.pairings.base = values["base"]
         self._last = None
 
     def largest_tilt(self, state: State) -> float:
