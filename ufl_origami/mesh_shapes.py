@@ -196,7 +196,10 @@ def hemisphere_quarter(
         )
         return _mesh(shape, n, structure)
 
-    return build_sheet(comm, make)
+    def onto(points: np.ndarray) -> np.ndarray:
+        return radius * points / np.linalg.norm(points, axis=1)[:, None]
+
+    return build_sheet(comm, make, onto)
 
 
 def cylinder_octant(
@@ -242,7 +245,12 @@ def cylinder_octant(
         )
         return _mesh(shape, n, structure)
 
-    return build_sheet(comm, make)
+    def onto(points: np.ndarray) -> np.ndarray:
+        round_axis = points * np.array([1.0, 0.0, 1.0])
+        away = radius / np.linalg.norm(round_axis, axis=1)[:, None] - 1.0
+        return points + away * round_axis
+
+    return build_sheet(comm, make, onto)
 
 
 def _check_positive(**values: float) -> None:

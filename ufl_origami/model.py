@@ -165,7 +165,7 @@ def place_nodes(configuration: Configuration, name: str) -> Nodes:
     dofs, rest = 3 * vertices[:, None] + np.arange(3), sheet.rest[vertices]
     if configuration.has_midpoints:
         facets = place_facets(sheet, name)
-        middle = sheet.rest[sheet.edge_vertices()[facets]].mean(axis=1)
+        middle = sheet.edge_middles()[facets]
         dofs = np.vstack([dofs, configuration.middle_dofs(facets)])
         rest = np.vstack([rest, middle])
     return Nodes(dofs, rest)

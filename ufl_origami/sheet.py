@@ -5,8 +5,8 @@ coordinates: panels may coincide in space.
 """
 
 import difflib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 from mpi4py import MPI
 
@@ -26,6 +26,8 @@ from ufl_origami.partition import (
     edge_table,
     pair_keys,
 )
+
+Surface = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ class SheetMesh:
         points: name -> local vertex, -1 where this rank does not have it.
         input_vertex: (nv,) index of each vertex in the input.
         input_cell: (nc,) index of each cell in the input.
+        surface: takes points (n, 3) near a curved rest surface onto it; None: the triangles are the
+            rest surface. Models of second order place the edges' midpoints by it.
     """
 
     mesh: mesh.Mesh
@@ -65,6 +69,7 @@ class SheetMesh:
     points: dict[str, int]
     input_vertex: np.ndarray
     input_cell: np.ndarray
+    surface: Surface | None = None
 
     @property
     def comm(self) -> MPI.Comm:
@@ -104,6 +109,11 @@ class SheetMesh:
         _, first = np.unique(facet, return_index=True)
         cell, e = np.divmod(slot[first], 3)
         return np.stack([self.cells[cell, (e + 1) % 3], self.cells[cell, (e + 2) % 3]], axis=1)
+
+    def edge_middles(self) -> np.ndarray:
+        """Return the rest position (nf, 3) of each facet's midpoint, on the rest surface."""
+        middle = self.rest[self.edge_vertices()].mean(axis=1)
+        return self.surface(middle) if self.surface else middle
 
     def panel_cells(self, name: str) -> np.ndarray:
         """Return the local cells of a panel.
@@ -178,6 +188,7 @@ def sheet_from_arrays(
     creases: Iterable[str] = (),
     points: Mapping[str, int] | None = None,
     partitioner: GraphPartitioner | None = None,
+    surface: Surface | None = None,
 ) -> SheetMesh:
     """Build the sheet from vertices and triangles.
 
@@ -194,6 +205,7 @@ def sheet_from_arrays(
         creases: the names in edges that are creases.
         points: name -> vertex.
         partitioner: graph partitioner, see :func:`ufl_origami.partition.destinations`.
+        surface: see :class:`SheetMesh`; given on all ranks.
 
     Raises:
         MeshError: on all ranks, when the arrays are no sheet: not finite, degenerate or inverted
@@ -207,7 +219,7 @@ def sheet_from_arrays(
 
     given = on_rank0(comm, prepare) or _Input()
     tags = comm.bcast(given.tags, root=0)
-    return _distribute(comm, given, tags)
+    return replace(_distribute(comm, given, tags), surface=surface)
 
 
 @dataclass(frozen=True)

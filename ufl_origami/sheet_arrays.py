@@ -8,7 +8,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_origami.collective import on_rank0
-from ufl_origami.sheet import SheetMesh, sheet_from_arrays
+from ufl_origami.sheet import SheetMesh, Surface, sheet_from_arrays
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,13 @@ class SheetArrays:
     points: Mapping[str, int] = field(default_factory=dict)
 
 
-def build_sheet(comm: MPI.Comm, make: Callable[[], SheetArrays]) -> SheetMesh:
+def build_sheet(
+    comm: MPI.Comm, make: Callable[[], SheetArrays], surface: Surface | None = None
+) -> SheetMesh:
     """Call `make` on rank 0 and build the sheet; collective, errors are raised on all ranks."""
     made = on_rank0(comm, make)
     if made is None:
-        return sheet_from_arrays(comm, None, None)
+        return sheet_from_arrays(comm, None, None, surface=surface)
     return sheet_from_arrays(
         comm,
         made.vertices,
@@ -48,4 +50,5 @@ def build_sheet(comm: MPI.Comm, make: Callable[[], SheetArrays]) -> SheetMesh:
         edges=made.edges,
         creases=made.creases,
         points=made.points,
+        surface=surface,
     )

@@ -66,8 +66,8 @@ def edge_weights(elements: FlatElements, *, normals: bool) -> np.ndarray:
     return np.einsum("pa,npc->nacp", gauss_shapes(), along).reshape(len(edges), 9, 6)
 
 
-def membrane_matrix(elements: FlatElements, stiffness: np.ndarray) -> np.ndarray:
-    """Matrix D (n, 12, 12) of the 9 edge and 3 cell pairings for stiffnesses (n, 3, 3) per area.
+def membrane_root(elements: FlatElements, stiffness: np.ndarray) -> np.ndarray:
+    """Matrix r (n, 9, 12), D = r^T r, of the 9 edge and 3 cell pairings; stiffnesses as above.
 
     The Regge interpolant is the P1 tensor with the strain's tangential components at the edges'
     Gauss points and its mean.
@@ -83,30 +83,36 @@ def membrane_matrix(elements: FlatElements, stiffness: np.ndarray) -> np.ndarray
     pairings[:, 6:, 9:] = np.eye(3) / (COMPONENTS * elements.area[:, None])[:, :, None]
     interpolation = np.linalg.solve(values, pairings)
     mass = elements.area[:, None, None] * products((np.eye(3) + 1) / 12, stiffness)
-    return interpolation.transpose(0, 2, 1) @ mass @ interpolation
+    return root(mass) @ interpolation
 
 
-@njit(cache=True)
-def sandwich(b, d, out):
-    """Add b^T d b to the leading rows and columns of out, element by element.
+def root(d: np.ndarray) -> np.ndarray:
+    """Matrices r (n, k, k) with r^T r = d, for positive definite d."""
+    return np.ascontiguousarray(np.linalg.cholesky(d).transpose(0, 2, 1))
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def add_gram(r, b, out):
+    """Add (r b)^T (r b) to the leading rows and columns of out, element by element.
 
     Args:
+        r: (n, k, rows).
         b: (n, rows, columns).
-        d: (n, rows, rows), symmetric.
-        out: (n, k, k) with k >= columns.
+        out: (n, m, m), m >= columns.
     """
     n, rows, columns = b.shape
-    work = np.zeros((rows, columns))
-    for c in range(n):
-        for i in range(rows):
-            for j in range(columns):
-                work[i, j] = 0.0
-            for k in range(rows):
-                value = d[c, i, k]
+    k = r.shape[1]
+    c = np.zeros((k, columns))
+    for element in range(n):
+        c[:] = 0.0
+        for i in range(k):
+            for a in range(rows):
+                value = r[element, i, a]
+                if value != 0.0:
+                    for j in range(columns):
+                        c[i, j] += value * b[element, a, j]
+        for i in range(columns):
+            for a in range(k):
+                value = c[a, i]
                 for j in range(columns):
-                    work[i, j] += value * b[c, k, j]
-        for k in range(rows):
-            for i in range(columns):
-                value = b[c, k, i]
-                for j in range(columns):
-                    out[c, i, j] += value * work[k, j]
+                    out[element, i, j] += value * c[a, j]

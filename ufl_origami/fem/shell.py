@@ -72,7 +72,9 @@ class FemShellTerm(StencilTerm):
         h = panels.thickness[:n]
         stiffness = algebra.plane_stress(panels.young[:n], panels.poisson[:n])
         self._bend = algebra.bending_matrix(elements, (h**3 / 12)[:, None, None] * stiffness)
-        self._stretch = algebra.membrane_matrix(elements, h[:, None, None] * stiffness)
+        self._bend_root = algebra.root(self._bend)
+        self._stretch_root = algebra.membrane_root(elements, h[:, None, None] * stiffness)
+        self._stretch = self._stretch_root.transpose(0, 2, 1) @ self._stretch_root
         self._weights = algebra.edge_weights(elements, normals=True)
         self._point_values = np.linalg.pinv(self._weights)
         coefficient = table.coefficient.reshape(n, 12)
@@ -206,8 +208,8 @@ class FemShellTerm(StencilTerm):
         self.pairings.set_stresses(self._moment, self._force)
         block[:] = 0.0
         block[:, :18, :18] = self.pairings.geometric()
-        algebra.sandwich(at.bending_rate, self._bend, block)
-        algebra.sandwich(at.membrane_rate, self._stretch, block)
+        algebra.add_gram(self._bend_root, at.bending_rate, block)
+        algebra.add_gram(self._stretch_root, at.membrane_rate, block)
 
     def accept(self, state: State) -> None:
         """Measure the angles from this state's normals from now on."""
@@ -262,9 +264,8 @@ class _Linearisation:
 
 def rest_nodes(configuration: Configuration) -> np.ndarray:
     """Rest positions (nc, 6, 3) of the nodes of the local cells: corners, then midpoints."""
-    corners = configuration.sheet.rest[configuration.sheet.cells]
-    middle = 0.5 * (np.roll(corners, -1, axis=1) + np.roll(corners, -2, axis=1))
-    return np.concatenate([corners, middle], axis=1)
+    sheet = configuration.sheet
+    return np.concatenate([sheet.rest[sheet.cells], sheet.edge_middles()[sheet.cell_edges]], axis=1)
 
 
 def corner_areas(nodes: np.ndarray) -> np.ndarray:
