@@ -26,6 +26,7 @@ _HOMES = {
     "StaticPath": "solvers.static",
     "MeshWarning": "errors",
     "StabilityWarning": "errors",
+    "RoundOffWarning": "errors",
     "SupportWarning": "errors",
     "build": "discretise",
     "mesh_pattern": "meshing",

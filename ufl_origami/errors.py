@@ -41,5 +41,9 @@ class StabilityWarning(UserWarning):
     """An accepted equilibrium with negative directions of the tangent: it is unstable."""
 
 
+class RoundOffWarning(UserWarning):
+    """Forces that are smaller than the round-off of the residual: the message tells by how much."""
+
+
 class SupportWarning(UserWarning):
     """A piece of the sheet that no condition keeps from turning: a singular tangent at rest."""

@@ -114,6 +114,14 @@ class Problem:
         rows = (self.constraints.dofs + self.configuration.offset).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, known, rhs)
 
+    def round_off(self, vector: PETSc.Vec) -> float:
+        """Round-off of the residual, eps max K_ii max |x|, by the tangent without constraints."""
+        diagonal = self.tangent.matrix.getDiagonal()
+        rest = np.abs(self.configuration.sheet.rest).max(initial=0.0)
+        size = self.configuration.comm.allreduce(rest, op=MPI.MAX)
+        size += vector.norm(PETSc.NormType.INFINITY)
+        return float(np.finfo(float).eps * diagonal.norm(PETSc.NormType.INFINITY) * size)
+
     def largest_turn(self, vector: PETSc.Vec, trial: PETSc.Vec) -> float:
         """Largest change (radians, to first order) of an unwrapped angle between two states."""
         state = self.state(vector)

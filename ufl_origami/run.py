@@ -27,6 +27,7 @@ from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model
 from ufl_origami.output import FieldWriter
 from ufl_origami.quality import warn_sagitta
+from ufl_origami.resolution import warn_round_off
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.newton import SHIFT_FACTOR, NewtonSettings, NewtonSolver
@@ -95,6 +96,7 @@ def solve_static(
         SupportWarning: a piece of the sheet may turn freely.
         MeshWarning: the mesh cannot represent the form, or the curvature that was found.
         StabilityWarning: an accepted state is unstable.
+        RoundOffWarning: the forces at the end are smaller than their round-off.
     """
     if resume and output is None:
         raise InputError("resume: name the output folder of the run to resume")
@@ -123,6 +125,7 @@ def solve_static(
 
         path.run(model.x, model.problem.time, stops, accept)
     warn_sagitta(model)
+    warn_round_off(model)
     return StaticResult(model, path.steps, log.history)
 
 

@@ -15,6 +15,9 @@ LU = {
     "pc_factor_mat_solver_type": "mumps",
 }
 
+WORKSPACES = (100, 400, 1600)
+"""Percentages beyond MUMPS's estimate of its workspace, tried where that was too small."""
+
 
 def linear_options(symmetric: bool) -> dict[str, object]:
     """Default options: MUMPS LDLt with inertia for a symmetric tangent, else MUMPS LU."""
@@ -45,6 +48,12 @@ class Factorisation:
         self.ksp.setUp()
         self.ksp.pc.setUp()
         self.count += 1
+        for workspace in WORKSPACES:
+            if not self._short_of_workspace():
+                break
+            self._enlarge(workspace)
+            self.ksp.pc.setUp()
+            self.count += 1
         if self.ksp.pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
             unknowns = self.matrix.getSize()[0]
             raise SolveError(
@@ -62,6 +71,22 @@ class Factorisation:
             factor = pc.getFactorMatrix()
             factor.setMumpsIcntl(13, 1)
             factor.setMumpsIcntl(24, 1)
+
+    def _short_of_workspace(self) -> bool:
+        """Whether MUMPS needs more than it had estimated (delayed pivots)."""
+        pc = self.ksp.pc
+        if pc.getFactorSolverType() != "mumps":
+            return False
+        return pc.getFactorMatrix().getMumpsInfog(1) in (-8, -9)
+
+    def _enlarge(self, workspace: int) -> None:
+        """Start afresh with more workspace: PETSc skips all work of a factor that once failed."""
+        pc = self.ksp.pc
+        pc.reset()
+        pc.setOperators(self.matrix)
+        pc.setFactorSetUpSolverType()
+        pc.getFactorMatrix().setMumpsIcntl(14, workspace)
+        self._ask_inertia()
 
     def negative_pivots(self) -> int | None:
         """Negative (and zero) pivots of the last factorisation, None where unknown."""

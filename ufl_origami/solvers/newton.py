@@ -11,11 +11,11 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
 
+from ufl_origami.errors import SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
 from ufl_origami.solvers.options import option_scope
@@ -163,13 +163,8 @@ class NewtonSolver:
         self._floor = self._round_off(x)
 
     def _round_off(self, x: PETSc.Vec) -> float:
-        """Round-off of the residual: eps max K_ii max |x|."""
-        diagonal = self.problem.tangent.matrix.getDiagonal()
-        rest = np.abs(self.problem.configuration.sheet.rest).max(initial=0.0)
-        size = self.problem.configuration.comm.allreduce(rest, op=MPI.MAX)
-        size += x.norm(PETSc.NormType.INFINITY)
-        eps = np.finfo(float).eps
-        return self.settings.floor * eps * diagonal.norm(PETSc.NormType.INFINITY) * size
+        """Tolerance that the residual's round-off allows."""
+        return self.settings.floor * self.problem.round_off(x)
 
     def factor(self, ksp: PETSc.KSP, *, shift: bool = True) -> int | None:
         """Factor the constrained tangent; with the guard, shift it until positive definite.
@@ -217,7 +212,12 @@ class NewtonSolver:
 
     def _run(self, snes: PETSc.SNES, x: PETSc.Vec, iterations: int) -> bool:
         snes.setTolerances(max_it=iterations)
-        snes.solve(None, x)
+        try:
+            snes.solve(None, x)
+        except PETSc.Error as error:  # PETSc wraps what its callbacks raise
+            if isinstance(error.__cause__, SolveError):
+                raise error.__cause__ from None
+            raise
         self.report.iterations += snes.getIterationNumber()
         code = snes.getConvergedReason()
         self.report.reason = REASONS.get(code, str(code))
