@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from ufl_origami import kernels
+from ufl_origami.analytic import cantilever_end_shear
 from ufl_origami.discretise import build
 from ufl_origami.errors import MeshWarning, SceneError, SupportWarning
+from ufl_origami.gallery.shell_problems import displacement
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.patch_check import curvature_maps, interior_cells, patch_errors, tangent_frames
@@ -17,10 +19,12 @@ from ufl_origami.quality import (
     LONG_EDGE,
     check_mesh,
     check_model,
+    crossed,
     sagitta,
     warn_mesh,
     warn_sagitta,
 )
+from ufl_origami.run import solve_static
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import sheet_from_arrays
 from ufl_origami.sides import edge_sides
@@ -404,3 +408,45 @@ def test_panels_at_a_crease_are_one_piece(comm):
     (piece,) = pieces(build(scene))
     assert piece.panels == ("plain", "odd")
     assert len(piece.motions) == 0
+
+
+@pytest.mark.mpi
+def test_crossings_are_those_of_criss_cross_and_union_jack(comm):
+    crisscross = rectangle(1.0, 1.0, 4, structure="crisscross", comm=comm)
+    assert crossed(crisscross).all()
+    for structure in ("structured", "unstructured"):
+        assert not crossed(rectangle(1.0, 1.0, 6, structure=structure, comm=comm)).any()
+    union_jack = crossed(sheet_of(comm, *lattice(4, 4, kind="union-jack")))
+    # the odd vertices inside the lattice, each of four triangles, four of which are on no other
+    assert comm.allreduce(int(union_jack.sum())) == 16
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("structure", ["crisscross", "structured"])
+def test_crossings_have_a_lower_limit_of_sagitta(comm, structure):
+    h, n, radius = 0.001, 16, 1.0
+    scene = Scene(rectangle(1.0, 1.0, n, structure=structure, comm=comm), Material(1e6, NU, h))
+    model = build(scene)
+    arc(model, radius)
+    worst, _ = sagitta(model)
+    assert 0.3 < worst.value < 1.0
+    findings = check_model(model)
+    assert [finding.limit for finding in findings] == [0.3] * (structure == "crisscross")
+    if findings:
+        with pytest.warns(MeshWarning, match=r"above 0.3 on .* criss-cross edges there"):
+            warn_sagitta(model)
+
+
+@pytest.mark.mpi
+def test_criss_cross_plate_that_locks_is_announced(comm):
+    """A plate under end shear, P L^2 / EI = 4, is too stiff by 3 % at a sagitta below h."""
+    sheet = rectangle(10.0, 4.0, (20, 8), structure="crisscross", comm=comm)
+    scene = Scene(sheet, Material(E=12 * 100.0 / 0.01**3, nu=0.0, h=0.01))
+    scene.fix("x0")
+    scene.clamp("x0")
+    scene.line_load("x1", (0.0, 0.0, 4.0))
+    with pytest.warns(MeshWarning, match="criss-cross edges there are too long"):
+        model = solve_static(scene, [1.0]).model
+    assert sagitta(model)[0].value < 1.0
+    exact = cantilever_end_shear(4.0, length=10.0)
+    assert displacement(model, "x1y0")[2] < 0.97 * exact.w
