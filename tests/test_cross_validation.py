@@ -1,7 +1,16 @@
 """Comparison of two models of a scene: what is measured, the registry, and the command."""
 
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from run_scenes import crush
 from scenes import E, H, build, follow, z_fold_scene
 
@@ -30,6 +39,7 @@ from ufl_origami.meshing import mesh_pattern
 from ufl_origami.scene import MODELS, Scene
 
 pytestmark = pytest.mark.mpi
+REPO = Path(__file__).resolve().parents[1]
 
 
 def arc(places, *, radius=0.5, angle=2.0):
@@ -184,3 +194,86 @@ def test_z_folds_of_soft_and_stiff_creases_and_both_poisson_ratios_are_registere
     names = [scene.name for scene in registered() if scene.name.startswith("z_fold")]
     assert len(names) == len(set(names)) >= 6
     assert any(scene.quick for scene in registered())
+
+
+def test_example_of_a_registered_scene_runs_as_it_stands(comm):
+    """The block of CONTRIBUTING.md, which `load_all` would find as a module."""
+    text = (REPO / "CONTRIBUTING.md").read_text()
+    (code,) = (
+        block
+        for block in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        if "register(" in block
+    )
+    exec(compile(code, "CONTRIBUTING.md", "exec"), {})
+    result = cross_validate(registered_scene("unequal_fold"), comm)
+    assert result.ok, [row for row in result.rows if not row.ok]
+
+
+def demo(folder, *words, ranks=1):
+    """Run the command in processes that are not taken for children of this one's launcher."""
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
+    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
+    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
+    command = [*mpirun, sys.executable, str(REPO / "demos" / "cross_validate.py"), *words]
+    command += ["--output", str(folder)]
+    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300)
+
+
+def table_of(folder):
+    """Rows of comparison.csv without its load factors."""
+    with (folder / "comparison.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """Folder and console of the quick command."""
+    folder = tmp_path_factory.mktemp("quick")
+    done = demo(folder, "--quick")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder, done.stdout
+
+
+@pytest.mark.serial
+def test_the_quick_command_compares_both_models_and_agrees(quick):
+    folder, console = quick
+    runs = json.loads((folder / "summary.json").read_text())["runs"]
+    load_all()
+    assert [run["scene"] for run in runs] == [scene.name for scene in registered() if scene.quick]
+    rows = table_of(folder)
+    assert len(rows) == sum(len(run["comparisons"]) for run in runs) > 20
+    assert {row["ok"] for row in rows} == {"yes"}
+    assert all(0 < float(row["difference"]) <= float(row["tolerance"]) for row in rows)
+    for run in runs:
+        ddg, fem = (run["models"][model] for model in MODELS)
+        assert ddg["triangles"] > fem["triangles"]
+        assert min(ddg["iterations"], fem["iterations"], ddg["seconds"], fem["seconds"]) > 0
+    for word in ("fold angle crease (deg)", "force right_edge", "energy crease", "profile front",
+                 "triangles", "dofs", "iterations", "seconds"):  # fmt: skip
+        assert word in console
+    assert f"both models agree in {len(runs)} scenes" in console
+    assert (imread(folder / "profiles.png")[..., :3].mean(axis=2) < 0.9).mean() > 0.005
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_command_fails_where_a_tolerance_is_exceeded(tmp_path, quick, ranks):
+    """The numbers are those of the quick command, on any number of ranks."""
+    done = demo(tmp_path, "--scene", "cantilever_shear", "--tighten", "1e6", ranks=ranks)
+    assert done.returncode == 1, done.stderr
+    rows = table_of(tmp_path)
+    assert {row["ok"] for row in rows} == {"NO"}
+    assert done.stdout.count("15 comparisons out of tolerance") == 1
+    wanted = [row for row in table_of(quick[0]) if row["scene"] == "cantilever_shear"]
+    for found, row in zip(rows, wanted, strict=True):
+        assert (found["quantity"], found["load factor"]) == (row["quantity"], row["load factor"])
+        for model in filter(row.get, MODELS):
+            assert float(found[model]) == pytest.approx(float(row[model]), rel=1e-6)
+
+
+@pytest.mark.serial
+def test_the_command_names_the_scene_it_does_not_know(tmp_path):
+    done = demo(tmp_path, "--scene", "cantilever_shaer")
+    assert done.returncode == 1
+    assert "did you mean 'cantilever_shear'" in done.stderr

@@ -23,11 +23,11 @@ register(
         sizes={"ddg": 0.25, "fem": 0.5},
         stops=(0.25, 0.5, 1.0),
         quantities=(
-            Displacement("x1y0", "x", LENGTH),
-            Displacement("x1y0", "z", LENGTH),
-            Energy("total"),
-            Energy("bending"),
-            Profile("y0", width=LENGTH),
+            Displacement("x1y0", "x", LENGTH, tolerance=2e-4),
+            Displacement("x1y0", "z", LENGTH, tolerance=2e-4),
+            Energy("total", tolerance=5e-4),
+            Energy("bending", tolerance=5e-4),
+            Profile("y0", width=LENGTH, tolerance=2e-4),
         ),
         quick=True,
     )
