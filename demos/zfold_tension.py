@@ -8,7 +8,7 @@ fold angle within 0.1 deg, pull within 1 %.
 
 Without --eta and --d1 the whole study runs; one value of each computes that case alone, with the
 first bending form and Poisson's ratio unless they are given. The fem model has one bending form of
-its own and takes triangles three times as long.
+its own and takes triangles five times as long.
 
     ./run demo zfold_tension
     ./run demo zfold_tension --eta 0.5 --d1 1.0
@@ -35,8 +35,8 @@ from ufl_origami.scene import Scene
 W, E = 1.0, 1e7  # width of a panel and length of the crease; Young's modulus
 PROFILE_ETA = (0.01, 0.5, 100.0)  # low, middle and high crease stiffness, of which profiles show
 FEATURED_D1 = 1.0  # opening in the chart of all models, in the picture and in the convergence
-SIZES = {"ddg": 0.042, "fem": 0.125}  # of the triangles over W, by default
-CONVERGENCE_SIZES = {"ddg": (0.24, 0.12, 0.06, 0.03), "fem": (0.48, 0.24, 0.12, 0.06)}
+SIZES = {"ddg": 0.042, "fem": 0.2}  # of the triangles over W, by default
+CONVERGENCE_SIZES = {"ddg": (0.24, 0.12, 0.06, 0.03), "fem": (1.0, 0.5, 0.35, 0.25)}
 ANGLE_TOLERANCE, FORCE_TOLERANCE = 0.1, 0.01  # of the claim: degrees, relative
 
 comm = MPI.COMM_WORLD

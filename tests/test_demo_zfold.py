@@ -147,6 +147,25 @@ def test_wrong_values_end_with_the_usage(tmp_path):
     assert done.returncode == 2 and "usage: ./run demo zfold_tension" in done.stderr
 
 
+def test_the_fem_model_gives_the_same_outputs_on_one_and_two_ranks(tmp_path):
+    """One case with the default mesh, near the elastica; the ddg model's choice is left empty."""
+    found = []
+    for ranks in (1, 2):
+        folder = tmp_path / str(ranks)
+        (run,) = summary(demo(folder, "--quick", "--model", "fem", ranks=ranks), folder)
+        assert list(run) == KEYS + ELASTICA_KEYS
+        assert (run["model"], run["bending"]) == ("fem", None)
+        assert sorted(f.stem for f in folder.glob("*.png")) == ["profiles", "sheet"]
+        assert len(read_history(folder / "fem_nu0_eta0.5" / "history.csv")) > 1
+        found.append(run)
+    one, two = found
+    assert one["triangles"] < 200
+    assert one["fold_angle_deg"] == pytest.approx(one["elastica_fold_angle_deg"], abs=0.01)
+    assert one["force"] == pytest.approx(one["elastica_force"], rel=1e-3)
+    for key in ("fold_angle_deg", "fold_angle_mid_deg", "force", "energy", "energy_crease"):
+        assert two[key] == pytest.approx(one[key], rel=1e-6), key
+
+
 def test_a_bending_form_of_another_model_is_refused(tmp_path):
     done = demo(tmp_path, "--quick", "--model", "fem", "--bending", "director")
     assert done.returncode == 1
