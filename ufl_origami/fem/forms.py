@@ -7,10 +7,10 @@ kinematic quantity with a stress-like coefficient:
 * bending: moments m (P1 symmetric tensors) with the second derivatives of x along the normal nu
   inside, int m : (nu . grad grad x), and with the angle a by which nu has turned about the edge
   on the boundary, oint a m_nn. This is the hybridised form of the Hellan-Herrmann-Johnson Koiter
-  shell of Neunteufel & Schoeberl 2019 (doi:10.1016/j.compstruc.2019.106543);
+  shell of Neunteufel & Schoeberl 2019 (arXiv:1904.04714);
 * membrane: edge weights n (P1) with the tangential Green strain, oint E_tt n_tt, and cell weights
   p (constant) with its mean, int E : p: the moments of the Regge interpolation that cures membrane
-  locking (Neunteufel & Schoeberl 2021, doi:10.1016/j.cma.2020.113524).
+  locking (Neunteufel & Schoeberl 2021, arXiv:1907.06232).
 
 The angle a is measured from the normal of a base state x0, carried along by the smallest rotation
 that takes the edge's tangent there to the current one: it needs no branch below half a turn of the

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
+from ufl_origami.configuration import MIDDLE
 from ufl_origami.errors import SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
@@ -288,7 +289,7 @@ class NewtonSolver:
 
 
 def shift_weights(problem: Problem) -> PETSc.Vec:
-    """Mass-like weights: lumped area at vertices, area squared at edge unknowns (rest state).
+    """Mass-like weights: lumped area at nodes, area squared at angles (rest state).
 
     Prescribed unknowns weigh nothing: a shift of their unit diagonal would change their values.
     """
@@ -304,7 +305,8 @@ def shift_weights(problem: Problem) -> PETSc.Vec:
     for name in configuration.edge_unknowns:
         slot = configuration.slot(name)[sheet.cell_edges[:n]]
         used = slot >= 0
-        weight = np.broadcast_to((area**2)[:, None], slot.shape)[used]
+        per_edge = area / 3 if name in MIDDLE else area**2
+        weight = np.broadcast_to(per_edge[:, None], slot.shape)[used]
         np.add.at(local, 3 * configuration.nv + slot[used], weight)
     vector = configuration.create_vector()
     configuration.add_to_global(local, vector)
