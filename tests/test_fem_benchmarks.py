@@ -18,12 +18,12 @@ STOPS = (0.25, 0.5, 0.75, 1.0)
 EVEN = ("structured", "unstructured")
 
 
-def solve(make, n, structure):
+def solve(make, n, structure, stops=STOPS):
     """Steps and largest error (by column) against the Kirchhoff-Love table."""
     problem = make(n, Form(structure, model="fem"))
-    result = problem.solve(STOPS)
+    result = problem.solve(stops)
     table = read_table(REFERENCE / f"kirchhoff_love_{problem.name}.csv")
-    errors = problem.table_errors(result.history, table, STOPS)
+    errors = problem.table_errors(result.history, table, stops)
     return result.steps, {name: float(np.abs(e).max()) for name, e in errors.items()}
 
 
@@ -31,12 +31,6 @@ def assert_followed(steps):
     """Default settings get through without a cut and without an unstable state."""
     assert [step.stability for step in steps] == ["stable"] * len(steps)
     assert sum(step.cuts for step in steps) == 0
-
-
-def order(make, counts, structure, columns=slice(None)):
-    """Fitted order of the largest error over some columns, and the errors."""
-    errors = [max(list(solve(make, n, structure)[1].values())[columns]) for n in counts]
-    return -np.polyfit(np.log(counts), np.log(errors), 1)[0], errors
 
 
 @pytest.mark.mpi
@@ -47,9 +41,9 @@ def test_coarse_annulus():
 
 
 def test_coarse_hemisphere():
-    steps, errors = solve(pinched_hemisphere, 16, "unstructured")
+    steps, errors = solve(pinched_hemisphere, 12, "unstructured")
     assert_followed(steps)
-    assert max(errors.values()) < 0.05
+    assert max(errors.values()) < 0.01
 
 
 def test_coarse_cylinder_snaps_through():
@@ -70,8 +64,11 @@ def test_annulus(structure):
 @pytest.mark.slow
 @pytest.mark.parametrize("structure", EVEN)
 def test_hemisphere(structure):
-    """Its rest shape is flat triangles: it needs finer meshes than sheets that are flat at rest."""
-    steps, errors = solve(pinched_hemisphere, 40, structure)
+    """Both kinds of mesh tend to 0.3 % above the table at full load, and to its values at half.
+
+    The table's own check (in its head) moves by 1.8 % at full load between its last two meshes.
+    """
+    steps, errors = solve(pinched_hemisphere, 32, structure)
     assert_followed(steps)
     assert max(errors.values()) < 0.005
 
@@ -93,13 +90,18 @@ def test_cylinder(structure):
 @pytest.mark.slow
 @pytest.mark.convergence
 @pytest.mark.parametrize(
-    ("make", "counts", "columns"),
+    ("make", "counts", "left_out", "stops"),
     [
-        (slit_annular_plate, (2, 4, 8), slice(None)),
-        (pinched_hemisphere, (8, 16, 32), slice(None)),
-        (cylinder_pullout, (6, 12, 24), slice(1, None)),
+        (slit_annular_plate, (2, 4, 8), (), STOPS),
+        (pinched_hemisphere, (8, 16, 32), (), STOPS[:2]),
+        (cylinder_pullout, (6, 12, 24), ("W_A",), STOPS),
     ],
 )
-def test_benchmarks_converge_with_order_two_or_better(make, counts, columns):
-    found, errors = order(make, counts, "structured", columns)
-    assert found > 1.9, errors
+def test_benchmarks_converge_with_order_two_or_better(make, counts, left_out, stops):
+    """Against what is exact in the tables: see the tests before."""
+    errors = []
+    for n in counts:
+        found = solve(make, n, "structured", stops)[1]
+        errors.append(max(error for name, error in found.items() if name not in left_out))
+    order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert order > 1.9, errors
