@@ -101,7 +101,8 @@ class Stopwatch:
 
     def times(self) -> Times:
         """Seconds of the slowest rank, once the block has ended; collective."""
-        mine = Times(self._block[0], *self.spent.values(), self._block[1])
+        total, elapsed = self._block
+        mine = Times(total, self.spent["assembly"], self.spent["factorisation"], elapsed)
         return max(self.comm.allgather(mine), key=lambda found: found.total)
 
     def wrapped(self, function: Callable, section: str) -> Callable:

@@ -7,11 +7,11 @@ chart.
 """
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import inf, isfinite, log
 from pathlib import Path
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -125,9 +125,14 @@ def read_points(file: str | Path) -> list[Point]:
             raise InputError(f"{file} is no table of work and precision: {reader.fieldnames}")
         rows = list(reader)
     try:
-        return [Point(**{k: _parse(kinds[k], text) for k, text in row.items()}) for row in rows]
+        return [_point(row, kinds) for row in rows]
     except ValueError as error:
         raise InputError(f"{file}: {error}") from error
+
+
+def _point(row: Mapping[str, str], kinds: Mapping[str, object]) -> Point:
+    values: dict[str, Any] = {name: _parse(kinds[name], text) for name, text in row.items()}
+    return Point(**values)
 
 
 def _parse(kind: object, text: str) -> str | int | float | None:
