@@ -1,4 +1,4 @@
-"""The speed benchmarks run, their shares add up, and their files say on what they ran."""
+"""The benchmarks run, their shares add up, and their files say on what they ran."""
 
 import json
 import os
@@ -11,9 +11,9 @@ import pytest
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
-def rows_of(name, tmp_path):
+def rows_of(name, tmp_path, *options):
     file = tmp_path / "figures.json"
-    command = [sys.executable, str(BENCHMARKS / name), "--quick", "--repeats", "1"]
+    command = [sys.executable, str(BENCHMARKS / name), "--quick", "--repeats", "1", *options]
     environment = os.environ | {"PYTHONPATH": str(BENCHMARKS.parent)}
     done = subprocess.run(
         [*command, "--output", str(file)], capture_output=True, text=True, env=environment
@@ -43,3 +43,33 @@ def test_newton_iteration(tmp_path):
         assert row["assembly %"] + row["factor %"] + row["rest %"] == pytest.approx(100)
         stages = ("residual s", "kernels s", "insertion s", "constraints s", "factor s", "solve s")
         assert row["iteration s"] == pytest.approx(sum(row[stage] for stage in stages))
+
+
+def twin_and_others(rows):
+    """Errors w and u in percent of the fem model, and of each other formulation by its name."""
+    errors = {row["formulation"]: (abs(row["w %"]), abs(row["u %"])) for row in rows}
+    assert all(row["tangent ms"] > 0 and row["iterations"] >= row["steps"] for row in rows)
+    return errors.pop("twin"), errors
+
+
+@pytest.mark.serial
+def test_fem_formulations_coarse_and_thin(tmp_path):
+    case = ["--mesh", "structured", "--n", "1", "--thinness", "1e-3"]
+    names = ["--formulation", "twin", "naghdi"]
+    twin, others = twin_and_others(rows_of("fem_formulations.py", tmp_path, *case, *names))
+    assert max(twin) < 0.02
+    assert min(others["naghdi"]) > 20 * max(twin)
+    assert max(others["naghdi"]) < 3
+
+
+@pytest.mark.slow
+@pytest.mark.serial
+@pytest.mark.parametrize("mesh", ["structured", "unstructured"])
+def test_fem_formulations_against_locking(tmp_path, mesh):
+    """At h / L = 1e-4 and one element across only the fem model is within a percent."""
+    case = ["--mesh", mesh, "--n", "1", "--thinness", "1e-4"]
+    twin, others = twin_and_others(rows_of("fem_formulations.py", tmp_path, *case))
+    assert max(twin) < 0.2
+    for name, (w, u) in others.items():
+        assert u > 1 and w > 5 * max(twin), name
+    assert others["hhj_regge"] < others["hhj"]
