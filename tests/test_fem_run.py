@@ -84,6 +84,16 @@ def test_a_resumed_run_equals_an_uninterrupted_one_to_the_bit(folder, make):
 
 
 @pytest.mark.mpi
+def test_rotation_beyond_half_a_turn_survives_a_restart(comm, folder):
+    """Work of the end moment M over a full turn: load energy - 2 pi M, M = 2 pi EI / L."""
+    options = {"steps": StepSettings(first=0.25, largest=0.25), "record": Record(fields="none")}
+    solve_static(roll(comm), [0.75], output=folder, **options)
+    result = solve_static(roll(comm), [0.75, 1.0], output=folder, resume=True, **options)
+    moment = 20.0 * np.pi
+    assert result.history["energy_load"][-1] == pytest.approx(-2 * np.pi * moment, rel=5e-3)
+
+
+@pytest.mark.mpi
 @pytest.mark.parametrize("serial_first", [True, False])
 def test_restart_on_another_number_of_ranks(comm, folder, serial_first):
     first, second = (MPI.COMM_SELF, comm) if serial_first else (comm, MPI.COMM_SELF)

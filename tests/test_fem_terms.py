@@ -167,7 +167,7 @@ def test_a_folded_sheet_carried_round_rigidly_stays_free_of_stress(angle):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("angle", [1.0, 3.0])
+@pytest.mark.parametrize("angle", [2.0])
 def test_a_bent_sheet_carried_round_rigidly_keeps_its_energies(angle):
     """Pulled open until the load factor is 1, then turned as a whole with its supports."""
     scene = z_fold_scene(0.4, 1.0, nu=0.3, model="fem")
