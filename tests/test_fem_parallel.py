@@ -16,6 +16,7 @@ from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.meshing import mesh_pattern
 from ufl_origami.scene import Scene
+from ufl_origami.sheet import sheet_from_arrays
 from ufl_origami.solvers.newton import NewtonSettings
 
 
@@ -91,3 +92,20 @@ def test_three_ranks_agree_too():
     done = subprocess.run([*command, test], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout[-2000:]
     assert f"{len(MODELS)} passed" in done.stdout
+
+
+@pytest.mark.mpi
+def test_a_rank_without_triangles_is_no_obstacle(comm):
+    """A single triangle with a natural curvature: nothing hinders it from taking that shape."""
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    edges = {"held": [(0, 1)]}
+    sheet = sheet_from_arrays(comm, vertices, np.array([[0, 1, 2]]), edges=edges, points={"tip": 2})
+    scene = Scene(sheet, Material(1e6, 0.0, 0.001), model="fem")
+    scene.fix("held")
+    scene.clamp("held")
+    curvature = 0.1
+    scene.natural_curvature("panel0", np.diag([0.0, curvature, 0.0]))
+    model = build(scene)
+    follow(model)
+    circle = [0.0, np.sin(curvature) / curvature, (1 - np.cos(curvature)) / curvature]
+    np.testing.assert_allclose(model.position("tip"), circle, atol=1e-4)

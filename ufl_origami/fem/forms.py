@@ -161,15 +161,16 @@ class ElementMatrix:
 
     Args:
         form: test space of blocks of 3, trial space of P2 positions.
+        rows: degrees of freedom of the test space on an element.
     """
 
-    def __init__(self, form):
+    def __init__(self, form, rows: int):
+        self._rows = rows
         self._form = compiled(form)
         self._matrix = fem.create_matrix(self._form)
 
     def blocks(self) -> np.ndarray:
         """Derivatives (n, rows, 18), one block an element."""
         compat.assemble_into(self._matrix, self._form)
-        n = self._matrix.index_map(1).size_local // 6
-        blocks = self._matrix.data.reshape(n, -1, 6, 3, 3)
-        return blocks.transpose(0, 1, 3, 2, 4).reshape(n, -1, 18)
+        blocks = self._matrix.data.reshape(-1, self._rows // 3, 6, 3, 3)
+        return blocks.transpose(0, 1, 3, 2, 4).reshape(-1, self._rows, 18)

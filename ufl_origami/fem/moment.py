@@ -57,7 +57,7 @@ class FemEdgeMoment(StencilTerm):
         force = ufl.derivative(total, self._x, ufl.TestFunction(elements.P))
         self._force = forms.compiled(force)
         stiffness = ufl.derivative(force, self._x, ufl.TrialFunction(elements.P))
-        self._stiffness = forms.ElementMatrix(stiffness)
+        self._stiffness = forms.ElementMatrix(stiffness, 18)
         self._ends = np.stack([(edges + 1) % 3, (edges + 2) % 3], axis=1)
         rows, points = self._cells[:, None], self._points
         slot = shell.table.slot[rows, points, 0]

@@ -33,8 +33,8 @@ class ClampPairings:
         tested = pairing(ufl.TestFunction(S))
         force = ufl.derivative(pairing(self.moment), self.x, ufl.TestFunction(P))
         self._value, self._force = forms.compiled(tested), forms.compiled(force)
-        self._rate = forms.ElementMatrix(ufl.derivative(tested, self.x, du))
-        self._stiffness = forms.ElementMatrix(ufl.derivative(force, self.x, du))
+        self._rate = forms.ElementMatrix(ufl.derivative(tested, self.x, du), 9)
+        self._stiffness = forms.ElementMatrix(ufl.derivative(force, self.x, du), 18)
 
     def value(self) -> np.ndarray:
         """Pairing (n, 9) at the current positions."""
@@ -81,9 +81,9 @@ class Pairings:
         self._values = {k: forms.compiled(form) for k, form in tested.items()}
         bending = tested["curvature"] + tested["angle"]
         self._rates = {
-            "bending": forms.ElementMatrix(ufl.derivative(bending, self.at.x, du)),
-            "edge": forms.ElementMatrix(ufl.derivative(tested["edge"], self.at.x, du)),
-            "cell": forms.ElementMatrix(ufl.derivative(tested["cell"], self.at.x, du)),
+            "bending": forms.ElementMatrix(ufl.derivative(bending, self.at.x, du), 9),
+            "edge": forms.ElementMatrix(ufl.derivative(tested["edge"], self.at.x, du), 9),
+            "cell": forms.ElementMatrix(ufl.derivative(tested["cell"], self.at.x, du), 3),
         }
         s = self.stresses
         work = (
@@ -94,7 +94,7 @@ class Pairings:
         )
         force = ufl.derivative(work, self.at.x, ufl.TestFunction(P))
         self._force = forms.compiled(force)
-        self._stiffness = forms.ElementMatrix(ufl.derivative(force, self.at.x, du))
+        self._stiffness = forms.ElementMatrix(ufl.derivative(force, self.at.x, du), 18)
 
     def place(self, positions: np.ndarray) -> None:
         """Set the current positions of the nodes (n, 6, 3)."""
@@ -114,7 +114,7 @@ class Pairings:
     def value(self, name: str) -> np.ndarray:
         """Pairing "curvature", "angle", "edge" (n, 9) or "cell" (n, 3) at the current positions."""
         vector = fem.assemble_vector(self._values[name])
-        values = vector.array.reshape(len(self.elements.area), -1)
+        values = vector.array.reshape(-1, 3 if name == "cell" else 9)
         if self.clamps and name == "angle":
             np.add.at(values, self.clamps.cells, self.clamps.value())
         return values
