@@ -57,7 +57,7 @@ PROBLEMS = {
         shells.slit_annular_plate, {"ddg": (4, 8, 16, 24), "fem": (2, 4, 8)}
     ),
     "hemisphere_18deg_hole": Problem(
-        shells.pinched_hemisphere, {"ddg": (8, 16, 32, 64), "fem": (4, 8, 16)}
+        shells.pinched_hemisphere, {"ddg": (8, 16, 32, 64), "fem": (4, 8, 16, 32)}
     ),
     "cylinder_open_end_pullout": Problem(
         shells.cylinder_pullout, {"ddg": (12, 24, 48, 72), "fem": (6, 12, 24)}
