@@ -53,6 +53,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "h": {"type": number(0.0), "help": "thickness over panel width"},
     "size": {"type": number(0.0), "help": "length of the triangles' sides over panel width"},
     "mesh": {"choices": STRUCTURES, "help": "kind of mesh"},
+    "problem": {"nargs": "+", "help": "problems to solve, one or several"},
+    "method": {"nargs": "+", "help": "discretisations to compare, one or several"},
     "scene": {"nargs": "+", "metavar": "NAME", "help": "scenes by name, one or several"},
     "tighten": {"type": number(0.0), "help": "number by which all tolerances are divided"},
 }

@@ -1,0 +1,163 @@
+"""The speed-accuracy demo as a user runs it, in its quick form: points, orders, text, charts."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import asdict, fields
+from math import exp, log
+from pathlib import Path
+
+import pytest
+from matplotlib.image import imread
+
+from ufl_origami.work_precision import Point, order, picked, read_points
+
+pytestmark = pytest.mark.serial  # each test starts its own processes
+
+REPO = Path(__file__).resolve().parent.parent
+TITLES = {"averaged": "DDG averaged", "director": "DDG director", "fem": "FEM twin"}
+MESHES = ("structured", "unstructured")
+
+
+def demo(folder, *words, ranks=1):
+    """Run the demo; its processes must not take this process for their launcher's child."""
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
+    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
+    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
+    command = [*mpirun, sys.executable, str(REPO / "demos" / "speed_accuracy.py"), *words]
+    command += ["--output", str(folder)]
+    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """Folder, points and text of the quick demo."""
+    folder = tmp_path_factory.mktemp("speed")
+    done = demo(folder, "--quick")
+    assert done.returncode == 0, done.stderr
+    text = (folder / "speed_accuracy.md").read_text()
+    assert text in done.stdout
+    return folder, read_points(folder / "speed_accuracy.csv"), text
+
+
+def curve(points, method, mesh):
+    return picked(points, method=method, mesh=mesh)
+
+
+def test_every_point_is_complete(quick):
+    folder, points, _ = quick
+    assert {(p.method, p.mesh) for p in points} == {(m, k) for m in TITLES for k in MESHES}
+    empty = {"error_deflection", "failure"}
+    for p in points:
+        assert p.problem == "z_fold" and not p.failure
+        assert all(getattr(p, f.name) is not None for f in fields(Point) if f.name not in empty)
+        assert p.factorisations >= p.steps > 0 and p.newton_iterations >= p.steps
+        parts = p.assembly_seconds, p.factorisation_seconds, p.rest_seconds
+        assert min(parts) > 0 and sum(parts) == pytest.approx(p.seconds, rel=1e-9)
+        assert (p.bending, p.measure != "") == (
+            ("", False) if p.model == "fem" else (p.method, True)
+        )
+    runs = json.loads((folder / "summary.json").read_text())["runs"]
+    assert runs == [asdict(p) for p in points]
+
+
+def test_observed_orders(quick):
+    """Second order for directors on any mesh, for averaged normals on structured ones only."""
+    points = quick[1]
+    for mesh in MESHES:
+        assert order(curve(points, "director", mesh)) == pytest.approx(2.0, abs=0.3)
+        assert order(curve(points, "fem", mesh)) > 2.0
+    assert order(curve(points, "averaged", "structured")) == pytest.approx(2.0, abs=0.3)
+    assert order(curve(points, "averaged", "unstructured")) < 0.5
+
+
+def test_errors_are_ranked_as_claimed(quick):
+    """Directors beat averaged normals on unstructured meshes, the twin both at equal size."""
+    points = quick[1]
+    director, averaged = (curve(points, m, "unstructured") for m in ("director", "averaged"))
+    assert director[-1].size == averaged[-1].size
+    for error, factor in (("angle", 0.2), ("force", 0.2), ("profile", 1.0)):
+        assert director[-1].error(error) < factor * averaged[-1].error(error)
+    for mesh in MESHES:
+        twin = curve(points, "fem", mesh)[-1]
+        same = [p for p in curve(points, "director", mesh) if p.size == twin.size]
+        assert twin.error() < 0.2 * same[0].error()
+
+
+def cost(points, tolerance, name):
+    """Cost of a tolerance, inf where it is not met: by hand, along the chart."""
+    errors = [max(p.error() for p in points[i:]) for i in range(len(points))]
+    costs = [getattr(p, name) for p in points]
+    if errors[0] <= tolerance:
+        return costs[0]
+    for i in range(1, len(points)):
+        if errors[i] <= tolerance:
+            share = log(errors[i - 1] / tolerance) / log(errors[i - 1] / errors[i])
+            return exp(log(costs[i - 1]) + share * log(costs[i] / costs[i - 1]))
+    return float("inf")
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.001])
+@pytest.mark.parametrize(("name", "unit"), [("seconds", "s"), ("dofs", "unknowns")])
+@pytest.mark.parametrize("mesh", MESHES)
+def test_text_names_the_winner_of_the_table(quick, tolerance, name, unit, mesh):
+    _, points, text = quick
+    paid = {m: cost(curve(points, m, mesh), tolerance, name) for m in TITLES}
+    winner = min(paid, key=paid.get)
+    assert paid[winner] < float("inf")
+    what = "seconds" if name == "seconds" else "unknowns"
+    section = text.split(f"Z-fold, {100 * tolerance:g} %, in {what} (largest error):")[1]
+    line = section.split(f"h/W = 0.01, {mesh} mesh: ")[1].splitlines()[0]
+    assert f"**{TITLES[winner]}** wins with" in line
+    value = float(line.split(f" {unit}")[0].split()[-1])
+    assert value == pytest.approx(paid[winner], rel=6e-3)  # printed with three digits
+    for method in set(TITLES) - {winner}:
+        if paid[method] == float("inf"):
+            assert f"{TITLES[method]} does not reach it" in line
+        else:
+            factor = float(line.split(f"{TITLES[method]} ")[1].split(" times")[0])
+            assert factor == pytest.approx(paid[method] / paid[winner], rel=6e-3)
+
+
+def test_text_states_the_settings(quick):
+    _, points, text = quick
+    settings = text.split("## Settings")[1]
+    for method, title in TITLES.items():
+        (chosen,) = {(p.step, p.measure) for p in points if p.method == method}
+        assert f"| z fold | {title} | {chosen[0]:g} |" in settings
+    assert f"| {chosen[1] or '-'} |" in settings
+
+
+def is_drawn(file):
+    """Whether a picture has ink in its upper and lower half and is not all ink."""
+    ink = imread(file)[..., :3].mean(axis=2) < 0.95
+    half = len(ink) // 2
+    return ink[:half].mean() > 0.002 and ink[half:].mean() > 0.002 and ink.mean() < 0.6
+
+
+def test_charts_are_drawn(quick):
+    names = ["error_dofs", "error_seconds", "speed_accuracy"]
+    assert sorted(f.stem for f in quick[0].glob("*.png")) == names
+    assert all(is_drawn(quick[0] / f"{name}.png") for name in names)
+
+
+def test_two_ranks_find_the_same_errors(quick, tmp_path):
+    done = demo(tmp_path, "--quick", "--method", "director", ranks=2)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("# Speed against accuracy\n") == 1
+    others = picked(quick[1], method="director")
+    found = read_points(tmp_path / "speed_accuracy.csv")
+    assert len(found) == len(others)
+    for p in found:
+        (one,) = picked(others, mesh=p.mesh, n=p.n)
+        assert (p.triangles, p.dofs) == (one.triangles, one.dofs)
+        assert p.error("force") == pytest.approx(one.error("force"), rel=1e-4)
+        assert p.error("profile") == pytest.approx(one.error("profile"), rel=1e-4)
+
+
+def test_unknown_names_end_with_close_ones(tmp_path):
+    done = demo(tmp_path, "--problem", "zfold")
+    assert done.returncode == 1 and "no problem is named 'zfold'" in done.stderr
+    assert "'z_fold'" in done.stderr
