@@ -5,8 +5,8 @@
   between triangles by interior facet integrals. Three quadrature points of the membrane strain are
   the cheap cure of its locking.
 * `hhj_regge`: the same with the membrane strain projected in the L2 sense on Regge elements, by a
-  third field; interpolation (Neunteufel & Schoeberl 2021, doi:10.1016/j.cma.2020.113524) would
-  need the elements' own functionals, which UFL does not have.
+  third field. The cure of Neunteufel & Schoeberl 2021 (doi:10.1016/j.cma.2020.113524) interpolates
+  instead, by functionals of single edges and elements, as the package's model does.
 * `naghdi`: the shear-flexible shell after Hale, Brunetti, Bordas & Maurini 2018
   (doi:10.1016/j.compstruc.2018.08.001): P2 displacements with cubic bubbles, P2 angles of the
   director, partial selective reduced integration (Arnold & Brezzi 1997,
