@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 from scenes import E, H, build, follow, strip_scene
 from test_model import LENGTH, STRIP_EI, rotation, tip_deflection
 
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.scene import Scene
+from ufl_origami.terms.form import FormTerm
 
 PANEL = "sheet"
 
@@ -93,6 +96,30 @@ def test_natural_curvature_bends_a_strip_into_an_arc_without_moment(structure):
         assert x[[0, 2]] == pytest.approx(tip[[0, 2]], rel=2e-3)
 
 
+@pytest.mark.mpi
+@pytest.mark.convergence
+def test_a_form_of_ones_own_acts_on_the_midpoints_too():
+    """Lifted strip on Winkler's foundation: k w_0 / lambda, lambda^4 = k / (4 EI) (Hetenyi)."""
+    stiffness, lift = 4 * STRIP_EI, 0.01
+
+    def foundation(configuration, functions):
+        k = fem.Constant(functions.sheet.mesh, stiffness)
+        return FormTerm("foundation", functions, energy=0.5 * k * functions.u[2] ** 2 * ufl.dx)
+
+    errors = []
+    for n in (16, 32):
+        sheet = rectangle(LENGTH, 1.0, n=(n, n // 8))
+        scene = Scene(sheet, Material(1.2e6, 0.0, 0.1), model="fem")
+        scene.move("x0", x=0.0, y=0.0, z=lift)
+        scene.clamp("x0")
+        scene.add_term(foundation)
+        model = build(scene)
+        follow(model)
+        errors.append(1 - model.reaction("x0")[2] / (stiffness * lift))
+    assert 0 < errors[1] < 5e-4
+    assert np.log2(errors[0] / errors[1]) > 3, errors
+
+
 COUNTS = {"ddg": (12, 24), "fem": (8,)}
 """Segments along one unit of length: two meshes of ddg, one of fem."""
 
@@ -174,11 +201,11 @@ CASES = [(pressed, "x1y1"), (quarter, "x1y1"), (turned_end, "y0_mid"), (curved, 
 @pytest.mark.parametrize(("make", "point"), CASES, ids=lambda case: getattr(case, "__name__", ""))
 def test_both_models_agree_to_discretisation_accuracy(make, point):
     """fem differs from ddg by no more than ddg from ddg on a mesh half as fine."""
-    coarse, fine, fem = (
+    coarse, fine, other = (
         results(make, point, model, n) for model, counts in COUNTS.items() for n in counts
     )
     scale = np.abs(fine)
     scale[1:4], scale[4:] = scale[1:4].max(), 1.0
-    refined, apart = np.abs(fine - coarse) / scale, np.abs(fine - fem) / scale
+    refined, apart = np.abs(fine - coarse) / scale, np.abs(fine - other) / scale
     assert (apart <= np.maximum(refined, 0.002)).all(), (refined, apart)
     assert apart.max() < 0.1, apart

@@ -10,7 +10,7 @@ from run_scenes import PULL_STEPS
 from scenes import E, H
 from test_run import assert_close, bits
 
-from ufl_origami.errors import InputError
+from ufl_origami.errors import InputError, SolveError
 from ufl_origami.gallery import z_fold
 from ufl_origami.history import Record, read_history
 from ufl_origami.material import Material
@@ -104,6 +104,17 @@ def test_restart_on_another_number_of_ranks(comm, folder, serial_first):
     if second is comm or comm.rank == 0:
         result = solve_static(roll(second), [0.6, 1.0], output=folder, resume=True, **OPTIONS)
         assert_close(result.history, reference.history, rtol=1e-7)
+
+
+@pytest.mark.mpi
+def test_a_crushed_sheet_is_refused_and_leaves_what_was_accepted(comm):
+    """Triangles below a tenth of their area are not accepted: area ratio 1 - 0.95 load factor."""
+    sheet = rectangle(1.0, 1.0, n=(2, 2), comm=comm)
+    scene = Scene(sheet, Material(1.0, 0.0, 0.1), model="fem")
+    scene.move("sheet", x=lambda time, rest: -0.95 * time * rest[:, 0], y=0.0, z=0.0)
+    with pytest.raises(SolveError, match=r"shrank to 0\.0") as caught:
+        solve_static(scene, [1.0], steps=StepSettings(first=0.5, smallest=0.01))
+    assert 0.9 / 0.95 - 0.02 < caught.value.load_factor <= 0.9 / 0.95
 
 
 @pytest.mark.mpi
