@@ -66,7 +66,7 @@ def test_fem_formulations_coarse_and_thin(tmp_path):
 @pytest.mark.serial
 @pytest.mark.parametrize("mesh", ["structured", "unstructured"])
 def test_fem_formulations_against_locking(tmp_path, mesh):
-    """At h / L = 1e-4 and one element across only the fem model has both errors within a percent."""
+    """At h / L = 1e-4, one element across, only the fem model has both errors within 1 %."""
     case = ["--mesh", mesh, "--n", "1", "--thinness", "1e-4"]
     twin, others = twin_and_others(rows_of("fem_formulations.py", tmp_path, *case))
     assert max(twin) < 0.2
