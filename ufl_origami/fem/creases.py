@@ -107,11 +107,9 @@ class FemSpring:
     rest: np.ndarray
 
     def law(self) -> CreaseLaw:
-        """Its law on angles (n, 2)."""
-        if self.spec.law:
-            return self.spec.law
-        rest = self.spec.rest_angle
-        return LinearLaw(self.spec.stiffness, self.rest[:, None] if rest is None else rest)
+        """Its law on the angles (n,) at one Gauss point of each edge."""
+        rest = self.rest if self.spec.rest_angle is None else self.spec.rest_angle
+        return self.spec.law or LinearLaw(self.spec.stiffness, rest)
 
 
 def rest_fold_angles(sheet: SheetMesh, fan: EdgeFan, nodes: np.ndarray) -> np.ndarray:
@@ -177,18 +175,9 @@ class FoldTerm(StencilTerm):
 
     def _law(self, state: State) -> list[np.ndarray]:
         """Energy, moment and stiffness (2 n,) of the points, times their lengths."""
-        angles = self.crease.angles(state.scalars)
-        values = [np.zeros_like(angles) for _ in range(3)]
-        for q in range(2):
-            for value, found in zip(values, self._point_law(angles[:, q]), strict=True):
-                value[:, q] = found
-        return [self._share * value.ravel() for value in values]
-
-    def _point_law(self, angles: np.ndarray) -> tuple[np.ndarray, ...]:
-        law = self._spring_law
-        if isinstance(law, LinearLaw) and isinstance(law.rest_angle, np.ndarray):
-            law = LinearLaw(law.stiffness, law.rest_angle[:, 0])
-        return law(angles, self._time)
+        points = [self._spring_law(a, self._time) for a in self.crease.angles(state.scalars).T]
+        kinds = zip(*points, strict=True)
+        return [self._share * np.stack(kind, axis=1).ravel() for kind in kinds]
 
     def energies(self, state: State) -> np.ndarray:
         """Energy of this rank's edges."""
