@@ -196,6 +196,7 @@ def test_z_folds_of_soft_and_stiff_creases_and_both_poisson_ratios_are_registere
     assert any(scene.quick for scene in registered())
 
 
+@pytest.mark.serial
 def test_example_of_a_registered_scene_runs_as_it_stands(comm):
     """The block of CONTRIBUTING.md, which `load_all` would find as a module."""
     text = (REPO / "CONTRIBUTING.md").read_text()

@@ -33,13 +33,13 @@ def assert_followed(steps):
     assert sum(step.cuts for step in steps) == 0
 
 
-@pytest.mark.mpi
 def test_coarse_annulus():
     steps, errors = solve(slit_annular_plate, 4, "unstructured")
     assert_followed(steps)
     assert max(errors.values()) < 0.01
 
 
+@pytest.mark.mpi
 def test_coarse_hemisphere():
     steps, errors = solve(pinched_hemisphere, 12, "unstructured")
     assert_followed(steps)

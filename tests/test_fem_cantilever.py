@@ -24,7 +24,6 @@ def largest_error(problem, stops=STOPS):
     return max(np.abs(e).max() for e in errors.values())
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_end_shear_gives_the_elastica(structure):
     assert largest_error(cantilever_shear(2, fem(structure))) < 0.005
