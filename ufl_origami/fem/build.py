@@ -94,5 +94,6 @@ def clamped_sides(scene: Scene) -> list[ClampedSides]:
         cells, edges = np.nonzero(np.isin(sheet.cell_edges[: sheet.num_owned_cells], facets))
         tangents = outward_tangents(sheet, 3 * cells + edges)
         given = clamp_tangent(clamp, tangents)
-        found.append(ClampedSides(cells, edges, given, clamp.natural))
+        stress_free = tangents if clamp.natural else given(0.0)
+        found.append(ClampedSides(cells, edges, given, stress_free))
     return found

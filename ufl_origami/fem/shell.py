@@ -22,13 +22,13 @@ class ClampedSides:
         cells: local cells (n,).
         edges: local edges (n,).
         tangent: function of time giving the tangents (n, 3).
-        natural: whether the rest face is stress-free, else the prescribed tangent at time 0 is.
+        stress_free: tangents (n, 3) at which the rest state has no moment at the edge.
     """
 
     cells: np.ndarray
     edges: np.ndarray
     tangent: Callable[[float], np.ndarray]
-    natural: bool
+    stress_free: np.ndarray
 
 
 class FemShellTerm(StencilTerm):
@@ -99,13 +99,10 @@ class FemShellTerm(StencilTerm):
 
     def _set_rest(self, rest: State, elements: FlatElements) -> None:
         """Adopt a state as stress-free: its tilts and curvatures, and those of the panels."""
-        self.set_time(0.0)
+        self._set_outward([sides.stress_free for sides in self.clamps])
         self._place(rest)
         self.offset = -self.table.tilts(rest.scalars) - self._angles()
-        for sides in self.clamps:
-            if sides.natural:
-                for q in range(2):
-                    self.offset[sides.cells, 2 * sides.edges + q] = 0.0
+        self.set_time(0.0)
         self._natural = self.pairings.value("curvature")
         if self.panels.curvature is not None:
             n = len(self._natural)
@@ -142,9 +139,11 @@ class FemShellTerm(StencilTerm):
 
     def set_time(self, time: float) -> None:
         """Set the prescribed normals."""
+        self._set_outward([sides.tangent(time) for sides in self.clamps])
+
+    def _set_outward(self, tangents: list[np.ndarray]) -> None:
         if self._clamp_pairings:
-            tangents = np.concatenate([sides.tangent(time) for sides in self.clamps])
-            self._clamp_pairings.outward.x.array[:] = tangents.ravel()
+            self._clamp_pairings.outward.x.array[:] = np.concatenate(tangents).ravel()
 
     def energies(self, state: State) -> np.ndarray:
         """Membrane and bending energy of this rank's triangles."""
