@@ -28,7 +28,7 @@ fail_together(comm)
 load_all()
 options = read_options(
     "cross_validate",
-    __doc__,
+    "\n    ".join([f"{__doc__}\nscenes:", *(scene.name for scene in registered())]),
     {"scene": ("all",), "tighten": 1.0},
     quick={"scene": tuple(scene.name for scene in registered() if scene.quick)},
     comm=comm,
