@@ -9,6 +9,7 @@ import pytest
 
 from ufl_origami import kernels
 from ufl_origami.analytic import cantilever_end_shear
+from ufl_origami.crossings import crossed
 from ufl_origami.discretise import build
 from ufl_origami.errors import MeshWarning, SceneError, SupportWarning
 from ufl_origami.gallery.shell_problems import displacement
@@ -19,7 +20,6 @@ from ufl_origami.quality import (
     LONG_EDGE,
     check_mesh,
     check_model,
-    crossed,
     sagitta,
     warn_mesh,
     warn_sagitta,
@@ -450,3 +450,21 @@ def test_criss_cross_plate_that_locks_is_announced(comm):
     assert sagitta(model)[0].value < 1.0
     exact = cantilever_end_shear(4.0, length=10.0)
     assert displacement(model, "x1y0")[2] < 0.97 * exact.w
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("model", ["ddg", "fem"])
+@pytest.mark.parametrize(("stretch", "found"), [(0.6, []), (0.55, [0.55])])
+def test_collapsing_triangles_are_announced(comm, model, stretch, found):
+    """A bar is weakest at the stretch 3^-1/2 = 0.577."""
+    sheet = rectangle(1.0, 1.0, 4, comm=comm)
+    scene = Scene(sheet, STEEL, model=model)
+    scene.move("sheet", x=lambda time, rest: (stretch - 1) * rest[:, 0], y=0.0, z=0.0)
+    built = build(scene)
+    dofs = built.problem.constraints.dofs
+    built.x.array_w[dofs] = built.problem.constraints.values(1.0)
+    built.x.assemble()
+    assert [f.figure for f in check_model(built)] == pytest.approx(found, rel=1e-9)
+    if found:
+        with pytest.warns(MeshWarning, match=r"a triangle has shrunk to 0\.55 of its area"):
+            warn_sagitta(built)

@@ -5,6 +5,7 @@
 | patch check (patch_check.py) | averaged normals | 2 % | bending energy wrong on any fine mesh |
 | altitude ratio | all | below 0.01 | tangent ill-conditioned; averaged normals biased |
 | long edges | directors | 2 % | panels too soft |
+| area ratio | all, once loaded | below 0.577 | compressed triangles collapse |
 | sagitta / h | all, once bent | 1, at crossings 0.3 | constant-strain membrane locks |
 
 Long edges: with directors the error follows the longest edge, however fine the mesh is across it.
@@ -30,7 +31,8 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_origami.collective import binned, reduced
+from ufl_origami.collective import reduced
+from ufl_origami.crossings import crossed
 from ufl_origami.errors import MeshWarning
 from ufl_origami.mesh_checks import altitude_ratios
 from ufl_origami.model import Model
@@ -40,8 +42,6 @@ from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeSides, edge_sides
 from ufl_origami.terms.shell import ShellTerm
 
-#: Length of the sum of two unit vectors that are nearly opposite.
-STRAIGHT = 0.05
 #: Largest relative error of the bending energy in the patch check.
 PATCH_LIMIT = 0.02
 #: Least smallest altitude / longest edge of a triangle.
@@ -55,6 +55,9 @@ NEARLY = 0.9
 LONG_EDGE = 2 / 3
 #: Largest such softness.
 LONG_EDGE_LIMIT = 0.02
+#: Least ratio of a triangle's current to its rest area: the stretch 3^-1/2 at which the force of a
+#: St. Venant-Kirchhoff bar, E (l^3 - l) / 2, is largest in compression.
+AREA_LIMIT = 3**-0.5
 #: Largest sagitta over thickness.
 SAGITTA_LIMIT = 1.0
 #: The same for triangles at a crossing.
@@ -66,10 +69,10 @@ class Finding:
     """One figure beyond its limit.
 
     Attributes:
-        kind: "patch", "altitude", "long edges" or "sagitta".
+        kind: "patch", "altitude", "long edges", "area" or "sagitta".
         figure: the worst value.
         limit: the limit that it passes.
-        panel: name of the panel where it is worst.
+        panel: name of the panel where it is worst, empty for "area".
         message: one line with the figure, the place and what it means.
     """
 
@@ -115,8 +118,26 @@ def check_mesh(scene: Scene, sides: EdgeSides | None = None) -> list[Finding]:
 
 def check_model(model: Model) -> list[Finding]:
     """Figures of the model's current state that are beyond their limits; collective."""
-    if not isinstance(model.shell, ShellTerm):  # the FEM shell does not lock
+    findings = _compression_findings(model)
+    if isinstance(model.shell, ShellTerm):  # the FEM shell does not lock
+        findings += _sagitta_findings(model)
+    return findings
+
+
+def _compression_findings(model: Model) -> list[Finding]:
+    sheet = model.sheet
+    ratio = sheet.comm.allreduce(model.shell.smallest_area_ratio(model.state), op=MPI.MIN)
+    if not ratio < AREA_LIMIT:
         return []
+    message = (
+        f"a triangle has shrunk to {ratio:.3g} of its area (limit {AREA_LIMIT:.3g}): such a "
+        "compression softens the material and may collapse it, a shell does not hold there; look "
+        "for triangles smaller than the thickness and loads that crush"
+    )
+    return [Finding("area", ratio, AREA_LIMIT, "", message)]
+
+
+def _sagitta_findings(model: Model) -> list[Finding]:
     value, area = _sagittas(model)
     worst = worst_triangle(model.sheet, value)
     if not worst.value > CROSSED_LIMIT:
@@ -143,9 +164,9 @@ def warn_mesh(scene: Scene, sides: EdgeSides | None = None) -> None:
 
 
 def warn_sagitta(model: Model) -> None:
-    """Warn (MeshWarning, on all ranks) where the current state bends an edge too much; collective.
+    """Warn (MeshWarning, on all ranks) of each finding of `check_model`; collective.
 
-    Meant for the end of a solve: one warning with the largest figure.
+    Meant for the end of a solve: one warning of a kind, with the worst figure.
     """
     _warn(check_model(model))
 
@@ -159,23 +180,6 @@ def sagitta(model: Model) -> tuple[Worst, float]:
     value, area = _sagittas(model)
     share = _share_above(model.sheet, value, area, SAGITTA_LIMIT)
     return worst_triangle(model.sheet, value), share
-
-
-def crossed(sheet: SheetMesh) -> np.ndarray:
-    """Mask (n_owned,) of triangles at a crossing of two nearly straight lines; collective.
-
-    Four triangles meet at such a vertex, and the unit vectors along its four edges cancel, which
-    only two pairs of opposite ones can.
-    """
-    cells = sheet.cells[: sheet.num_owned_cells]
-    corners = sheet.rest[cells]
-    forward, backward = np.roll(corners, -1, 1) - corners, np.roll(corners, 1, 1) - corners
-    along = [v / np.linalg.norm(v, axis=2, keepdims=True) for v in (forward, backward)]
-    rows = np.concatenate([along[0] + along[1], np.ones((*cells.shape, 1))], axis=2)
-    vertex = sheet.input_vertex[cells]
-    found = binned(sheet.comm, vertex.ravel(), rows.reshape(-1, 4), sheet.num_vertices_global)
-    straight = np.linalg.norm(found[:, :3], axis=1) < 4 * STRAIGHT  # each edge in two triangles
-    return (straight & (found[:, 3] == 4))[vertex].any(axis=1)
 
 
 def _share_above(sheet: SheetMesh, value: np.ndarray, area: np.ndarray, limit: float) -> float:
