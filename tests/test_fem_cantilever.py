@@ -7,6 +7,7 @@ import pytest
 
 from ufl_origami.analytic.reference_tables import read_table
 from ufl_origami.gallery.shell_problems import Form, cantilever_moment, cantilever_shear
+from ufl_origami.solvers.static import StepSettings
 
 REFERENCE = Path(__file__).parent / "reference"
 STOPS = (0.25, 0.5, 0.75, 1.0)
@@ -75,4 +76,9 @@ def test_a_strip_of_a_ten_thousandth_of_its_length_does_not_lock(structure):
 @pytest.mark.slow
 @pytest.mark.parametrize("structure", ["structured", "unstructured"])
 def test_a_strip_of_a_ten_thousandth_of_its_length_rolls_up_to_a_full_circle(structure):
-    assert largest_error(cantilever_moment(2, fem(structure), slenderness=1e-4)) < 0.005
+    """In steps of an eighth of a turn: quarters may end in another stable state, with a dimple."""
+    problem = cantilever_moment(2, fem(structure), slenderness=1e-4)
+    result = problem.solve(STOPS, StepSettings(largest=0.125))
+    errors = problem.exact_errors(result.history, STOPS)
+    assert max(np.abs(e).max() for e in errors.values()) < 5e-4
+    assert result.history["energy_membrane"][-1] < 1e-6 * result.history["energy_bending"][-1]
