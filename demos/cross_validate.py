@@ -6,7 +6,7 @@ and profiles must agree within the tolerances that the scene states. One scene o
 one that a model cannot follow to its end, and the command fails.
 
     ./run demo cross_validate
-    ./run demo cross_validate --scene cantilever_shear -n 2
+    ./run demo cross_validate -n 2 --scene cantilever_shear
     ./run demo cross_validate --quick --tighten 1000
 """
 
