@@ -7,6 +7,7 @@ from dolfinx import fem
 from scenes import E, H, build, follow, strip_scene
 from test_model import LENGTH, STRIP_EI, rotation, tip_deflection
 
+from ufl_origami.errors import SceneError
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import cylinder_octant, rectangle
 from ufl_origami.scene import Scene
@@ -224,3 +225,20 @@ def test_held_edges_of_a_curved_shell_are_stress_free_at_rest(name, kind):
     forces = model.x.duplicate()
     model.problem.forces(model.x, forces)
     assert forces.norm() < 1e-12 * E * H**3
+
+
+@pytest.mark.parametrize(
+    "choice", [{"bending": "averaged"}, {"measure": "sin"}, {"membrane": "ufl"}]
+)
+def test_choices_of_the_other_model_are_refused(choice):
+    with pytest.raises(SceneError, match="choice of the ddg model"):
+        Scene(rectangle(1.0, 1.0, n=(1, 1)), Material(E, 0.3, H), model="fem", **choice)
+
+
+def test_one_word_gives_the_same_scene_with_the_other_model():
+    scene = strip_scene((10, 1), bending="averaged")
+    scene.edge_moment("x1", 2.0)
+    twin = scene.with_model("fem")
+    scene.fix("x1", "y")  # the copy has its own lists
+    assert (twin.model, twin.bending, len(twin.motions)) == ("fem", "director", 1)
+    assert tip_deflection(twin) == pytest.approx(2.0 * LENGTH**2 / 2 / STRIP_EI, rel=2e-3)

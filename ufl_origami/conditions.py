@@ -9,7 +9,8 @@ from ufl_origami.configuration import Configuration
 from ufl_origami.constraints import Constraints
 from ufl_origami.errors import SceneError
 from ufl_origami.model import place_nodes, place_vertices
-from ufl_origami.scene import ClampSpec, LoadSpec, Scene, displacement_function
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import ClampSpec, LoadSpec, displacement_function
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeSides, side_ends
 from ufl_origami.terms import loads

@@ -6,7 +6,8 @@ import numpy as np
 
 from ufl_origami.collective import together
 from ufl_origami.errors import SceneError
-from ufl_origami.scene import CreaseSpec, Scene
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import CreaseSpec
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan
 

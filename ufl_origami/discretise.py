@@ -20,7 +20,8 @@ from ufl_origami.fem.build import build_fem
 from ufl_origami.model import Model
 from ufl_origami.problem import Problem
 from ufl_origami.quality import warn_mesh
-from ufl_origami.scene import LoadSpec, Scene
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import LoadSpec
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan, EdgeSides, edge_fan, edge_sides, side_ends
 from ufl_origami.springs import (

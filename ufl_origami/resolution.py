@@ -18,7 +18,7 @@ import numpy as np
 
 from ufl_origami.errors import RoundOffWarning
 from ufl_origami.model import Model
-from ufl_origami.scene import CreaseSpec
+from ufl_origami.scene_parts import CreaseSpec
 from ufl_origami.solvers.newton import NewtonSettings
 
 #: Tolerance of the residual over the forces above which these are lost.

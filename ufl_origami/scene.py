@@ -2,14 +2,12 @@
 
 A scene only declares. `build` (discretise.py) makes exactly the terms and unknowns that it names.
 
-Values: a number or vector is proportional to the load factor (or time); a function of time is
-taken as it is. Displacement components may also be functions f(time, rest) of the rest
-coordinates (n, 3) of the vertices.
+Values that follow the load factor or time are read as scene_parts.py says.
 """
 
-import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -17,104 +15,30 @@ from ufl_origami.configuration import Configuration
 from ufl_origami.crease_laws import CreaseLaw
 from ufl_origami.errors import SceneError
 from ufl_origami.material import Material
+from ufl_origami.scene_parts import (
+    ClampSpec,
+    CreaseSpec,
+    Displacement,
+    LoadSpec,
+    MotionSpec,
+    Pair,
+    Scalar,
+    Vector,
+    scalar_function,
+    vector_function,
+)
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.stencils import BENDING_FORMS
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.form import SheetFunctions
 
-TimeFunction = Callable[[float], float]
 MODELS = ("ddg", "fem")
 """Discretisations of the panels and creases."""
 
 IN_PLANE = 1e-6
 """Sine of the angle to a mirror plane below which a triangle lies in it."""
 
-Scalar = float | TimeFunction
-Displacement = Scalar | Callable[..., np.ndarray | float]
-Vector = Sequence[float] | Callable[[float], np.ndarray]
-Pair = tuple[str, str]
 TermMaker = Callable[[Configuration, SheetFunctions], Term]
-
-
-def scalar_function(value: Scalar, label: str) -> TimeFunction:
-    """Function of time from a number (proportional to time) or a function.
-
-    Raises:
-        SceneError: the number is not finite.
-    """
-    if callable(value):
-        return value
-    if not np.isfinite(value):
-        raise SceneError(f"{label}: value {value} is not finite")
-    return lambda time: value * time
-
-
-def vector_function(value: Vector, label: str) -> Callable[[float], np.ndarray]:
-    """Function of time from a vector (proportional to time) or a function.
-
-    Raises:
-        SceneError: not three finite numbers; for a function, when it is called.
-    """
-
-    def checked(given) -> np.ndarray:
-        vector = np.asarray(given, dtype=float)
-        if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise SceneError(f"{label}: expected three finite numbers, got {given}")
-        return vector
-
-    if callable(value):
-        function: Callable[[float], np.ndarray] = value
-        return lambda time: checked(function(time))
-    vector = checked(value)
-    return lambda time: vector * time
-
-
-@dataclass(frozen=True)
-class CreaseSpec:
-    """Spring of one crease between two of its panels (None: its only two)."""
-
-    name: str
-    law: CreaseLaw | None
-    stiffness: Scalar
-    rest_angle: Scalar | None
-    pair: Pair | None
-
-    @property
-    def stiff(self) -> bool:
-        """Whether the fold is held (infinite stiffness) instead of sprung."""
-        return self.law is None and not callable(self.stiffness) and bool(np.isinf(self.stiffness))
-
-
-@dataclass(frozen=True)
-class MotionSpec:
-    """Prescribed displacement components (None: free) of a named point, edge set or panel."""
-
-    name: str
-    components: tuple[Displacement | None, ...]
-
-
-@dataclass(frozen=True)
-class ClampSpec:
-    """Prescribed outward tangent of a boundary; None: that of the rest face.
-
-    Attributes:
-        name: boundary.
-        tangent: function of time and rest tangents (n, 3), giving (3,) or (n, 3), or None.
-        natural: whether the rest face is stress-free, else the prescribed tangent at time 0 is.
-    """
-
-    name: str
-    tangent: Callable[[float, np.ndarray], np.ndarray] | None
-    natural: bool = True
-
-
-@dataclass(frozen=True)
-class LoadSpec:
-    """A load of one kind ("point", "line", "area", "pressure", "moment") on a named thing."""
-
-    kind: str
-    name: str
-    value: Callable
 
 
 @dataclass
@@ -151,6 +75,8 @@ class Scene:
         """Check names and fill in the form's own tilt measure."""
         if self.model not in MODELS:
             raise SceneError(f"model {self.model!r} is none of {MODELS}")
+        if self.model == "fem":
+            self._refuse_ddg_choices()
         if self.bending not in BENDING_FORMS:
             raise SceneError(f"bending {self.bending!r} is none of {BENDING_FORMS}")
         if self.membrane not in ("kernel", "ufl"):
@@ -164,6 +90,22 @@ class Scene:
             missing = set(self.sheet.panel_names) - set(self.material)
             if missing:
                 raise SceneError(f"panels without material: {sorted(missing)}")
+
+    def _refuse_ddg_choices(self) -> None:
+        choices = {
+            "bending": (self.bending, "director"),
+            "measure": (self.measure or "tan", "tan"),
+            "membrane": (self.membrane, "kernel"),
+        }
+        for name, (given, default) in choices.items():
+            if given != default:
+                raise SceneError(f"{name} {given!r} is a choice of the ddg model, not of fem")
+
+    def with_model(self, model: str) -> "Scene":
+        """Return the same scene for another model, with that model's default choices."""
+        copies = {p.name: list(getattr(self, p.name)) for p in fields(self) if _is_list(p)}
+        kept: dict[str, Any] = {"sheet": self.sheet, "material": self.material, **copies}
+        return Scene(model=model, curvatures=dict(self.curvatures), **kept)
 
     def panel_material(self, panel: str) -> Material:
         """Material of a panel."""
@@ -338,21 +280,5 @@ class Scene:
             self.sheet.edge_facets(name)
 
 
-def displacement_function(value: Displacement, rest: np.ndarray, label: str):
-    """Function of time giving displacements (n,) of vertices with rest coordinates (n, 3)."""
-    if not callable(value):
-        return scalar_function(value, label)
-    function: Callable[..., np.ndarray | float] = value
-    if _required_arguments(function) > 1:
-        return lambda time: function(time, rest)
-    return function
-
-
-def _required_arguments(function: Callable) -> int:
-    """Number of positional arguments without default; 1 where Python cannot tell (builtins)."""
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except ValueError:
-        return 1
-    positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return sum(p.kind in positional and p.default is p.empty for p in parameters)
+def _is_list(part: Field) -> bool:
+    return part.default_factory is list

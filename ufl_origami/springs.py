@@ -12,7 +12,8 @@ from ufl_origami.creases import mesh_angles, spring_edges
 from ufl_origami.declared import declared_springs
 from ufl_origami.errors import SceneError
 from ufl_origami.model import CreaseModel
-from ufl_origami.scene import CreaseSpec, Scene
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import CreaseSpec
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan
 from ufl_origami.terms.base import Term

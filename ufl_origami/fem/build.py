@@ -20,7 +20,8 @@ from ufl_origami.fem.unknowns import edge_unknowns, fold_angle_names, node_dofs,
 from ufl_origami.model import CreaseModel, Model
 from ufl_origami.problem import Problem
 from ufl_origami.quality import warn_mesh
-from ufl_origami.scene import LoadSpec, Scene
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import LoadSpec
 from ufl_origami.sides import edge_fan, edge_sides
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.form import SheetFunctions

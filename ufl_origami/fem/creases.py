@@ -11,7 +11,8 @@ from ufl_origami.crease_laws import CreaseLaw, LinearLaw
 from ufl_origami.declared import declared_springs
 from ufl_origami.errors import SceneError
 from ufl_origami.fem.unknowns import fold_angle_names
-from ufl_origami.scene import CreaseSpec, Scene
+from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import CreaseSpec
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan, fold_combination, full_turns
 from ufl_origami.terms.base import StencilTerm
