@@ -21,6 +21,7 @@ STEPS = (0.125, 0.25, 0.5, 1.0)
 MESHES = ("structured", "unstructured")
 REPEATS = 3  # runs of a point, at most
 ENOUGH = 1.0  # seconds after which a point is not run again
+SMALLEST = 16.0  # part of the load step below which a path counts as failed
 THINNER = 3.0  # ratio of thicknesses in the check of the tables' reach
 SAME = 1e-6  # errors that differ by less are those of the same equilibrium
 
@@ -115,7 +116,7 @@ def thinner(
     step, measure = choices[method.name].step, choices[method.name].measure or None
     return [
         attempt(problem, Setting(n, MESHES[0], method, measure, thickness, comm), step)
-        for n in problem.middle[method.model]
+        for n in problem.counts[method.model][-2:]
         if problem.table
     ]
 
@@ -166,9 +167,8 @@ def solve(case: Case, step: float, comm: MPI.Comm) -> Solved:
         result, failure = None, ""
         with timed(comm) as watch:
             try:
-                result = solve_static(
-                    model, [1.0], record=case.record, steps=StepSettings(step, step), progress=False
-                )
+                sizes = StepSettings(step, step, smallest=step / SMALLEST)
+                result = solve_static(model, [1.0], record=case.record, steps=sizes, progress=False)
             except SolveError as error:
                 failure = str(error)
     errors = case.errors(result) if result else {}

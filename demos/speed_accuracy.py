@@ -70,6 +70,8 @@ for problem in problems:
             p = points[-1]
             what = f"{p.problem} {p.thickness:g} {p.mesh} {p.method} n = {p.n}"
             print(f"{what}: {p.error():.3%} in {p.seconds:.3f} s {p.failure}", flush=True)
+    if comm.rank == 0:
+        write_points(options.output / "speed_accuracy.csv", points)
 
 # %% Whether the tables serve other thicknesses
 thin = {
@@ -82,8 +84,6 @@ thin = {
 if comm.rank == 0:
     print()
     print_table([asdict(point) | {"error": point.error()} for point in points], COLUMNS)
-    options.output.mkdir(parents=True, exist_ok=True)
-    write_points(options.output / "speed_accuracy.csv", points)
     write_summary(options.output, [asdict(point) for point in points])
     text = report(points, choices, thin)
     (options.output / "speed_accuracy.md").write_text(text, encoding="ascii")

@@ -18,7 +18,7 @@ crumples, needs more.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, log
+from math import ceil, isfinite, log
 from pathlib import Path
 from typing import Any
 
@@ -185,15 +185,19 @@ def _nearest(scene: Scene, points: Sequence[Point], structures: Sequence[str]) -
 def _set_up(
     curve: Sequence[Point], tolerance: float, length: float, area: float
 ) -> Recommendation | None:
-    """The coarsest mesh of one method that meets a tolerance, for panels of a length and area."""
+    """The coarsest mesh of one method that meets a tolerance, for panels of a length and area.
+
+    Its size divides the panel length into whole segments.
+    """
     sizes = [p.size / p.panel_length for p in curve]
     errors = [p.error() for p in curve]
     met = cost_at(sizes, errors, SAFETY * tolerance)
     if met is None:
         return None
+    ratio = 1 / ceil(1 / met.value - 1e-9)  # whole segments
     density = [p.triangles * p.size**2 / p.sheet_area for p in curve]
-    size, some = met.value * length, curve[0]
-    triangles = float(np.interp(-met.value, -np.array(sizes), density)) * area / size**2
+    size, some = ratio * length, curve[0]
+    triangles = float(np.interp(-ratio, -np.array(sizes), density)) * area / size**2
     done = [p for p in curve if not p.failure]
     seconds = _on_chart(triangles, [p.triangles for p in done], [p.seconds for p in done])
     return Recommendation(
