@@ -18,6 +18,7 @@ NAMES = {
     "largest": "largest error",
 }
 COLUMNS = 3
+LEAST = 3e-5  # error at which the overview ends
 
 
 def known(points: Iterable[Point]) -> list[Problem]:
@@ -45,7 +46,9 @@ def draw_all(points: Sequence[Point], folder: Path) -> list[Path]:
     overview = list(overview_panels(points))
     file = folder / "speed_accuracy.png"
     columns = min(COLUMNS, len(overview))
-    chart = work_precision_chart(overview, file, columns=columns, abscissa=COSTS["seconds"])
+    chart = work_precision_chart(
+        overview, file, columns=columns, abscissa=COSTS["seconds"], least=LEAST
+    )
     return [chart, *files]
 
 

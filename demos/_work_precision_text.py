@@ -147,8 +147,8 @@ def introduction(points: Sequence[Point]) -> list[str]:
         "with --quick), after all kernels were compiled. In this run "
         f"{elapsed:.2f} seconds passed for each of them.",
         "- A tolerance is met from that mesh on from which all finer ones meet it as well; costs "
-        'between two meshes are interpolated on the logarithmic chart. "At most": the coarsest '
-        "mesh meets it already.",
+        "between two meshes are interpolated on the logarithmic chart, and a finer mesh that costs "
+        'less counts instead. "At most": the coarsest mesh meets it already.',
         "- Errors are relative: included fold angle and pull to those of the elastica, profile "
         "(largest distance of a vertex of the front edge from its place) to the panel's width, the "
         "worse of the two measured displacements to its reference.",
@@ -236,7 +236,11 @@ def row(cells: Sequence[str]) -> str:
 
 def orders(points: Sequence[Point]) -> list[str]:
     """Order of each curve in the size of the mesh."""
-    lines = ["Of the largest error, fitted through the three finest meshes.", ""]
+    lines = [
+        "Of the largest error, fitted through the three finest meshes; where these have reached "
+        "the floor of the reference (last section) it says nothing.",
+        "",
+    ]
     methods = methods_of(points)
     lines += head(["problem", "thickness", "mesh", *(TITLES[name] for name in methods)])
     for problem in known(points):

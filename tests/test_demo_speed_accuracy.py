@@ -91,11 +91,12 @@ def cost(points, tolerance, name):
     errors = [max(p.error() for p in points[i:]) for i in range(len(points))]
     costs = [getattr(p, name) for p in points]
     if errors[0] <= tolerance:
-        return costs[0]
+        return min(costs)
     for i in range(1, len(points)):
         if errors[i] <= tolerance:
             share = log(errors[i - 1] / tolerance) / log(errors[i - 1] / errors[i])
-            return exp(log(costs[i - 1]) + share * log(costs[i] / costs[i - 1]))
+            between = exp(log(costs[i - 1]) + share * log(costs[i] / costs[i - 1]))
+            return min(between, *costs[i:])
     return float("inf")
 
 

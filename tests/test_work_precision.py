@@ -15,6 +15,7 @@ from ufl_origami.work_precision import (
     error_names,
     order,
     picked,
+    place_of,
     read_points,
     write_points,
 )
@@ -45,6 +46,19 @@ def test_tolerances_beyond_the_ends_of_a_curve():
     assert cost_at(costs, errors, 0.005) is None
     assert cost_at(costs, errors, 0.2) == Cost(1.0, most=True)
     assert cost_at(costs, errors, 0.01).value == pytest.approx(2.0)
+
+
+def test_a_finer_mesh_that_costs_less_counts():
+    assert cost_at([1.0, 50.0, 3.0, 9.0], [0.1, 0.01, 0.002, 0.001], 0.01).value == 3.0
+    assert cost_at([7.0, 3.0], [0.01, 0.001], 0.05) == Cost(3.0, most=True)
+
+
+def test_places_on_a_curve():
+    errors = [0.1, 0.01, 0.0001]
+    assert place_of(errors, 0.5) == 0 and place_of(errors, 1e-5) is None
+    assert place_of(errors, 0.01) == pytest.approx(1.0)
+    assert place_of(errors, 0.001) == pytest.approx(1.5)
+    assert place_of([inf, 0.01, 0.0001], 0.05) == 1
 
 
 def test_a_failed_coarse_mesh_leaves_the_next_finer_one():

@@ -32,6 +32,7 @@ _HOMES = {
     "mesh_pattern": "meshing",
     "read_fold": "fold_io",
     "read_history": "history",
+    "recommend": "recommendation",
     "sheet_from_arrays": "sheet",
     "solve_static": "run",
     "write_fold": "fold_io",

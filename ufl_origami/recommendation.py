@@ -28,7 +28,7 @@ from ufl_origami.collective import binned
 from ufl_origami.errors import InputError
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import SheetMesh
-from ufl_origami.work_precision import Point, assured, cost_at, picked, read_points
+from ufl_origami.work_precision import Point, assured, picked, place_of, read_points
 
 TABLE = Path(__file__).parent / "data" / "speed_accuracy.csv"
 SAFETY = 0.8
@@ -191,10 +191,11 @@ def _set_up(
     """
     sizes = [p.size / p.panel_length for p in curve]
     errors = [p.error() for p in curve]
-    met = cost_at(sizes, errors, SAFETY * tolerance)
-    if met is None:
+    place = place_of(errors, SAFETY * tolerance)
+    if place is None:
         return None
-    ratio = 1 / ceil(1 / met.value - 1e-9)  # whole segments
+    wanted = float(np.exp(np.interp(place, np.arange(len(sizes)), np.log(sizes))))
+    ratio = 1 / ceil(1 / wanted - 1e-9)  # whole segments
     density = [p.triangles * p.size**2 / p.sheet_area for p in curve]
     size, some = ratio * length, curve[0]
     triangles = float(np.interp(-ratio, -np.array(sizes), density)) * area / size**2
@@ -206,7 +207,7 @@ def _set_up(
         measure=some.measure,
         structure=some.mesh,
         size=size,
-        error=float(assured(errors)[0]) if met.most else SAFETY * tolerance,
+        error=float(assured(errors)[0]) if place == 0 else SAFETY * tolerance,
         triangles=round(triangles),
         seconds=seconds,
         problem=some.problem,

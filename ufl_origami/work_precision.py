@@ -9,7 +9,7 @@ chart.
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from math import inf, isfinite, log
+from math import ceil, inf, isfinite, log
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -170,25 +170,36 @@ class Cost:
 def cost_at(costs: Sequence[float], errors: Sequence[float], tolerance: float) -> Cost | None:
     """Cost of a tolerance on a curve, None where its finest mesh does not meet it.
 
+    Where a finer mesh happens to cost less, its cost counts.
+
     Args:
-        costs: positive costs (n,), or sizes, from coarse to fine.
+        costs: positive costs (n,) from coarse to fine.
         errors: errors (n,) of the same meshes.
         tolerance: largest error.
+    """
+    at = place_of(errors, tolerance)
+    if at is None:
+        return None
+    fine = ceil(at)
+    between = float(np.exp(np.interp(at, np.arange(len(costs)), np.log(costs))))
+    return Cost(min([between, *map(float, costs[fine:])]), most=fine == 0)
+
+
+def place_of(errors: Sequence[float], tolerance: float) -> float | None:
+    """Place on a curve, 0 the coarsest mesh, from which on it meets a tolerance; None: nowhere.
+
+    Between two meshes the place is where the logarithm of the error is, or the finer one where the
+    coarser has no solution.
     """
     least = assured(errors)
     met = np.flatnonzero(least <= tolerance)
     if not len(met):
         return None
     fine = int(met[0])
-    if fine == 0:
-        return Cost(float(costs[0]), most=True)
-    coarse = fine - 1
-    high, low = float(least[coarse]), float(least[fine])
-    if not (isfinite(high) and low > 0):
-        return Cost(float(costs[fine]))
-    share = log(high / tolerance) / log(high / low)
-    between = (1 - share) * log(costs[coarse]) + share * log(costs[fine])
-    return Cost(float(np.exp(between)))
+    if fine == 0 or not (isfinite(least[fine - 1]) and least[fine] > 0):
+        return float(fine)
+    high, low = float(least[fine - 1]), float(least[fine])
+    return fine - 1 + log(high / tolerance) / log(high / low)
 
 
 def order(points: Sequence[Point], error: str = "largest", last: int = 3) -> float:

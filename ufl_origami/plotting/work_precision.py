@@ -54,6 +54,7 @@ def work_precision_chart(
     columns: int,
     abscissa: str,
     levels: Sequence[float] = (0.01, 0.001),
+    least: float | None = None,
 ) -> Path:
     """Errors against cost, both logarithmic; equal axes in a row, equal abscissae everywhere.
 
@@ -63,6 +64,7 @@ def work_precision_chart(
         columns: charts in a row.
         abscissa: name of the costs, with unit.
         levels: errors that thin lines mark.
+        least: error at which the charts end; None: all are shown.
 
     Raises:
         InputError: nothing to draw.
@@ -83,6 +85,8 @@ def work_precision_chart(
             for level in levels:
                 axes.axhline(level, color=_LEVEL, lw=0.8, zorder=0.8)
             axes.set(title=panel.title, xscale="log", yscale="log")
+            if least is not None:
+                axes.set_ylim(bottom=least)
         for axes in grid.flat[len(panels) :]:
             axes.set_axis_off()
         _name_axes(grid, panels, columns, abscissa)
