@@ -16,11 +16,11 @@ from ufl_origami.solvers.static import StaticPath, StepSettings
 E, H = 1e7, 0.01
 
 
-def follow(model, stops=(1.0,), *, first=0.125, newton=None, on_accept=None):
+def follow(model, stops=(1.0,), *, first=0.125, newton=None, on_accept=None, **steps):
     """Accepted steps of a static path from rest."""
     newton = newton or NewtonSettings()
     solver = NewtonSolver(model.problem, newton)
-    path = StaticPath(model.problem, solver, StepSettings(first=first), Admissible(model))
+    path = StaticPath(model.problem, solver, StepSettings(first=first, **steps), Admissible(model))
     path.run(model.x, 0.0, stops, on_accept)
     return path
 

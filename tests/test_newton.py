@@ -30,7 +30,7 @@ def residuals(method, slenderness):
     model = build(cantilever_shear(2, slenderness=slenderness).scene)
     solver = NewtonSolver(model.problem, NewtonSettings(method=method, rtol=0.0))
     reports, solve = [], solver.solve
-    solver.solve = lambda *args: reports.append(solve(*args)) or reports[-1]
+    solver.solve = lambda *args, **kw: reports.append(solve(*args, **kw)) or reports[-1]
     StaticPath(model.problem, solver, ONE_STEP).run(model.x, 0.0, [1.0])
     return np.array(reports[0].residuals)
 

@@ -4,11 +4,13 @@ from petsc4py import PETSc
 
 import numpy as np
 import pytest
-from scenes import build, disturb, follow, z_fold_scene
+from scenes import E, H, build, disturb, follow, z_fold_scene
 
 from ufl_origami.errors import SolveError, StabilityWarning
+from ufl_origami.gallery import z_fold
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
+from ufl_origami.meshing import mesh_pattern
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, StepSettings
@@ -97,11 +99,39 @@ def test_the_watchdog_carries_starved_full_steps_to_the_same_equilibrium():
     angles = []
     for iterations in (12, 1):
         model = build(z_fold_scene(0.25, 0.1))
-        path = follow(model, first=0.5, newton=NewtonSettings(iterations=iterations))
+        newton = NewtonSettings(iterations=iterations)
+        path = follow(model, first=0.5, newton=newton, retreats=0)
         assert all(step.cuts == 0 for step in path.steps)
         angles.append(model.mean_fold_angle("crease"))
     assert sum(step.iterations for step in path.steps) > 2 * len(path.steps)
     assert angles[1] == pytest.approx(angles[0], abs=1e-9)
+
+
+def hinge_led_round(model):
+    """Two flat unit panels joined by a free hinge, the outer edge led along a circle about it."""
+    sheet = mesh_pattern(z_fold(included_angle=180.0), 1 / 8, structure="structured")
+    scene = Scene(sheet, Material(E, 0.0, H), model=model)
+    scene.crease("crease", 0.0)
+    scene.fix("left_edge")
+    scene.clamp("left_edge")
+    scene.move(
+        "right_edge",
+        x=lambda time: np.cos(0.5 * np.pi * time) - 1.0,
+        y=0.0,
+        z=lambda time: np.sin(0.5 * np.pi * time),
+    )
+    return build(scene)
+
+
+def test_a_step_that_would_end_on_another_branch_is_cut():
+    """Exact: both panels stay flat. The watchdog finds another equilibrium from too far away."""
+    angles = {}
+    for retreats in (0, 3):
+        model = hinge_led_round("ddg")
+        follow(model, retreats=retreats)
+        angles[retreats] = model.mean_fold_angle("crease")
+    assert angles[3] == pytest.approx(0.5 * np.pi, abs=1e-6)
+    assert abs(angles[0] - 0.5 * np.pi) > 1.0
 
 
 @pytest.mark.mpi

@@ -224,12 +224,15 @@ class NewtonSolver:
         self.report.reason = REASONS.get(code, str(code))
         return code > 0
 
-    def solve(self, x: PETSc.Vec, previous: PETSc.Vec | None = None) -> NewtonReport:
+    def solve(
+        self, x: PETSc.Vec, previous: PETSc.Vec | None = None, *, search: bool = True
+    ) -> NewtonReport:
         """Seek the equilibrium at the problem's time from x, in place.
 
         Args:
             x: start, with the prescribed unknowns at their values; the solution on return.
             previous: the state from which a predictor led to x (for the MIP stress), or None.
+            search: whether the watchdog may follow a first run of full steps that failed.
         """
         self._previous = None if previous is None else previous.copy()
         settings = self.settings
@@ -238,11 +241,11 @@ class NewtonSolver:
             self.report.converged = self._run(self._full, x, 10 * settings.iterations)
             return self.report
         start = x.copy()
-        for cycle in range(settings.cycles):
+        for cycle in range(settings.cycles if search else 1):
             if self._full_steps(x):
                 self.report.converged = True
                 return self.report
-            if cycle + 1 < settings.cycles and self._line_search(start, x, 4 * 2**cycle):
+            if search and cycle + 1 < settings.cycles and self._line_search(start, x, 4 * 2**cycle):
                 self.report.converged = True
                 return self.report
         return self.report

@@ -37,6 +37,9 @@ class StepSettings:
         turn: a predicted change (radians) of a fold angle or loaded edge from which on the step is
             cut before it is tried: beyond half a turn its branch would be a guess.
         growth: factor after an easy step.
+        retreats: how often a step that does not converge in one run of full Newton steps is cut
+            before Newton's watchdog may search further off: what it finds far away may lie on
+            another branch.
         easy: Newton iterations up to which a step is easy.
     """
 
@@ -46,6 +49,7 @@ class StepSettings:
     turn: float = np.pi
     growth: float = 1.5
     easy: int = 9
+    retreats: int = 3
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,9 @@ class StaticPath:
         begin, cuts = clock.perf_counter(), 0
         iterations = factorisations = 0
         while True:
-            trial, report = self._try(x, time, target)
+            may_cut = 0.5 * (target - time) >= self.settings.smallest
+            search = cuts >= self.settings.retreats or not may_cut
+            trial, report = self._try(x, time, target, search=search)
             iterations += report.iterations
             factorisations += report.factorisations
             why = self._refusal(trial, report)
@@ -201,7 +207,9 @@ class StaticPath:
             return report.reason
         return self.check(trial) if self.check else ""
 
-    def _try(self, x: PETSc.Vec, time: float, target: float) -> tuple[PETSc.Vec, NewtonReport]:
+    def _try(
+        self, x: PETSc.Vec, time: float, target: float, *, search: bool
+    ) -> tuple[PETSc.Vec, NewtonReport]:
         """Predictor and Newton from an accepted state whose tangent is factored."""
         self.newton.report = NewtonReport(iterations=1)
         trial = self._predict(x, target)
@@ -209,7 +217,7 @@ class StaticPath:
         if turn >= self.settings.turn:
             self.newton.report.reason = f"an angle would turn by {np.degrees(turn):.0f} deg"
             return trial, self.newton.report
-        return trial, self.newton.solve(trial, x)
+        return trial, self.newton.solve(trial, x, search=search)
 
     def _predict(self, x: PETSc.Vec, target: float) -> PETSc.Vec:
         """Linear solution of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
