@@ -97,7 +97,9 @@ class Budgeted(NewtonSolver):
 
     spent = 0
 
-    def solve(self, x: PETSc.Vec, previous: PETSc.Vec | None = None) -> NewtonReport:
+    def solve(
+        self, x: PETSc.Vec, previous: PETSc.Vec | None = None, *, search: bool = True
+    ) -> NewtonReport:
         """Seek an equilibrium, see `NewtonSolver.solve`.
 
         Raises:
@@ -106,7 +108,7 @@ class Budgeted(NewtonSolver):
         if self.spent >= BUDGET:
             raise SolveError(f"budget of {BUDGET} iterations is spent")
         try:
-            return super().solve(x, previous)
+            return super().solve(x, previous, search=search)
         finally:
             self.spent += self.report.iterations
 
