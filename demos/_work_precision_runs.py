@@ -19,8 +19,8 @@ from ufl_origami.work_precision import Point
 
 STEPS = (0.125, 0.25, 0.5, 1.0)
 MESHES = ("structured", "unstructured")
-REPEATS = 3  # runs of a point, at most
-ENOUGH = 1.0  # seconds after which a point is not run again
+REPEATS = 10  # runs of a point, at most
+ENOUGH = 0.5  # seconds after which a point is not run again
 SMALLEST = 16.0  # part of the load step below which a path counts as failed
 THINNER = 3.0  # ratio of thicknesses in the check of the tables' reach
 SAME = 1e-6  # errors that differ by less are those of the same equilibrium

@@ -1,81 +1,17 @@
 """The study in words: who wins where and by what factor, made from the points alone."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from math import inf
+from collections.abc import Mapping, Sequence
 from statistics import median
 
 from _work_precision_figures import COSTS, NAMES, known
 from _work_precision_problems import METHODS, Problem, own_check
 from _work_precision_runs import MESHES, REPEATS, STEPS, THINNER, Choice, Trial, same
+from _work_precision_verdicts import TOLERANCES, Verdict, judge, methods_of
 
-from ufl_origami.work_precision import Cost, Point, cost_at, error_names, order, picked
+from ufl_origami.work_precision import Cost, Point, order, picked
 
-TOLERANCES = (0.01, 0.001)
 UNITS = {"seconds": "s", "dofs": "unknowns"}
 TITLES = {method.name: method.title for method in METHODS}
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What the methods pay for a tolerance in one error of one problem.
-
-    Attributes:
-        problem, thickness, error, mesh, tolerance, cost: what is compared.
-        paid: method -> cost, None where its finest mesh does not reach the tolerance.
-    """
-
-    problem: Problem
-    thickness: float
-    error: str
-    mesh: str
-    tolerance: float
-    cost: str
-    paid: Mapping[str, Cost | None]
-
-    @property
-    def winner(self) -> str | None:
-        """Name of the cheapest method, None where none reaches the tolerance."""
-        found = {name: cost.value for name, cost in self.paid.items() if cost}
-        return min(found, key=lambda name: found[name]) if found else None
-
-    def factor(self, name: str) -> float:
-        """Cost of a method over the winner's, inf where it does not reach the tolerance."""
-        paid, best = self.paid[name], self.paid[self.winner] if self.winner else None
-        return paid.value / best.value if paid and best else inf
-
-
-def judge(points: Sequence[Point], errors: Iterable[str] | None = None) -> Iterator[Verdict]:
-    """All verdicts of a study; the errors are the problem's and the "largest" by default."""
-    for problem in known(points):
-        own = picked(points, problem=problem.name)
-        names = error_names(own)
-        for thickness in dict.fromkeys(p.thickness for p in own):
-            for error in errors or (("largest", *names) if len(names) > 1 else ("largest",)):
-                for mesh in dict.fromkeys(p.mesh for p in own):
-                    for tolerance in TOLERANCES:
-                        for cost in COSTS:
-                            some = picked(own, thickness=thickness, mesh=mesh)
-                            paid = prices(some, error, tolerance, cost)
-                            yield Verdict(problem, thickness, error, mesh, tolerance, cost, paid)
-
-
-def methods_of(points: Iterable[Point]) -> list[str]:
-    """Names of the methods of the points, in the order of the study."""
-    names = {point.method for point in points}
-    return [method.name for method in METHODS if method.name in names]
-
-
-def prices(
-    points: Sequence[Point], error: str, tolerance: float, cost: str
-) -> dict[str, Cost | None]:
-    """Cost of a tolerance by method."""
-    paid = {}
-    for method in methods_of(points):
-        some = picked(points, method=method)
-        costs, errors = [getattr(p, cost) for p in some], [p.error(error) for p in some]
-        paid[method] = cost_at(costs, errors, tolerance)
-    return paid
 
 
 def number(value: float) -> str:
@@ -117,11 +53,19 @@ def report(
     points: Sequence[Point],
     choices: Mapping[str, Mapping[str, Choice]],
     thin: Mapping[str, Sequence[Trial]],
+    ranks: int,
 ) -> str:
-    """The whole text, in Markdown."""
+    """The whole text, in Markdown.
+
+    Args:
+        points: all points.
+        choices: problem -> method -> settings.
+        thin: problem -> what is known of smaller thicknesses.
+        ranks: number of processes.
+    """
     verdicts = list(judge(points))
     parts = [
-        ["# Speed against accuracy", "", *introduction(points)],
+        ["# Speed against accuracy", "", *introduction(points, ranks)],
         ["## In short", "", *summary(verdicts)],
         ["## Who wins", "", *winners(verdicts)],
         ["## Cost of each tolerance", "", *tables(verdicts)],
@@ -133,12 +77,12 @@ def report(
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
 
-def introduction(points: Sequence[Point]) -> list[str]:
+def introduction(points: Sequence[Point], ranks: int) -> list[str]:
     """How to read the figures."""
     elapsed = sum(p.elapsed for p in points) / sum(p.seconds for p in points)
     failed = sum(bool(p.failure) for p in points)
     return [
-        f"{len(points)} points, {failed} of them without a solution. Made by "
+        f"{len(points)} points, {failed} of them without a solution, on {ranks} rank(s). Made by "
         "`./run demo speed_accuracy`; nothing is written by hand.",
         "",
         "- Seconds are processor seconds of the slowest rank for the whole path from rest to the "
@@ -156,21 +100,26 @@ def introduction(points: Sequence[Point]) -> list[str]:
 
 
 def summary(verdicts: Sequence[Verdict]) -> list[str]:
-    """How often each method wins over all problems, kinds of mesh and thicknesses."""
+    """How often each method wins over all problems and thicknesses, by kind of mesh."""
     lines = []
     for tolerance in TOLERANCES:
         for cost in COSTS:
-            some = [
-                v for v in verdicts
-                if (v.tolerance, v.cost, v.error) == (tolerance, cost, "largest") and v.winner
-            ]  # fmt: skip
-            methods = [name for name in TITLES if any(name in v.paid for v in some)]
-            parts = [tally(some, name) for name in methods]
-            lines.append(
-                f"- At {percent(tolerance)} in {cost if cost == 'seconds' else 'unknowns'} "
-                f"({len(some)} cases): {'; '.join(parts)}."
-            )
+            for mesh in MESHES:
+                wanted = (tolerance, cost, mesh, "largest")
+                some = [v for v in verdicts if (v.tolerance, v.cost, v.mesh, v.error) == wanted]
+                what = "seconds" if cost == "seconds" else "unknowns"
+                head = f"- At {percent(tolerance)} in {what} on {mesh} meshes"
+                lines.append(f"{head} ({len(some)} cases): {tallies(some)}.")
     return lines
+
+
+def tallies(verdicts: Sequence[Verdict]) -> str:
+    """Wins of all methods."""
+    some = [v for v in verdicts if v.winner]
+    names = [name for name in TITLES if any(name in v.paid for v in some)]
+    none = f"no method reaches it in {len(verdicts) - len(some)}"
+    parts = [tally(some, name) for name in names]
+    return "; ".join(parts + [none] * (len(some) < len(verdicts)))
 
 
 def tally(verdicts: Sequence[Verdict], name: str) -> str:

@@ -85,7 +85,7 @@ if comm.rank == 0:
     print()
     print_table([asdict(point) | {"error": point.error()} for point in points], COLUMNS)
     write_summary(options.output, [asdict(point) for point in points])
-    text = report(points, choices, thin)
+    text = report(points, choices, thin, comm.size)
     (options.output / "speed_accuracy.md").write_text(text, encoding="ascii")
     draw_all(points, options.output)
     print(f"\n{text}")

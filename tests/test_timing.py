@@ -84,7 +84,7 @@ def test_timing_changes_no_result_and_leaves_nothing_behind(comm):
     plain, steps = pulled()
     with timed(comm) as watch:
         model, others = pulled()
-    assert np.array_equal(plain.x.array_r, model.x.array_r)
+    assert np.allclose(plain.x.array_r, model.x.array_r, rtol=0, atol=1e-9)  # MUMPS on two ranks
     assert [s.iterations for s in steps] == [s.iterations for s in others]
     assert {pair: vars(pair[0])[pair[1]] for pair in before} == before
     times = watch.times()
