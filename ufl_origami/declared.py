@@ -1,6 +1,6 @@
 """Declared springs of a scene's creases: which panels each of them joins, checked."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -67,3 +67,23 @@ def spring_sides(sheet: SheetMesh, fan: EdgeFan, spec: CreaseSpec) -> tuple[int,
             raise SceneError(f"crease {spec.name!r}: panel {panel!r} is not at it exactly once")
         found.append(int(at[0]))
     return found[0], found[1]
+
+
+def held_angle(
+    spec: CreaseSpec, sign: np.ndarray, shape: np.ndarray
+) -> Callable[[float], np.ndarray]:
+    """Virtual angles (n,) of a stiff fold as a function of time.
+
+    Args:
+        spec: its declaration.
+        sign: factors (n,) of the fold angle in the virtual ones.
+        shape: fold angles (n,) of the rest shape, held where no rest angle is declared (radians).
+    """
+    rest = spec.rest_angle
+    if rest is None:
+        return lambda time: sign * shape
+    if callable(rest):
+        function: Callable[[float], float] = rest
+        return lambda time: sign * function(time)
+    number = rest
+    return lambda time: sign * number

@@ -1,6 +1,6 @@
 """Springs of a scene's creases: between which panels, with which rest angle, or held stiff."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from ufl_origami.configuration import Configuration, State
 from ufl_origami.constraints import Constraints
 from ufl_origami.crease_laws import LinearLaw
 from ufl_origami.creases import mesh_angles, spring_edges
-from ufl_origami.declared import declared_springs
+from ufl_origami.declared import declared_springs, held_angle
 from ufl_origami.errors import SceneError
 from ufl_origami.model import CreaseModel
 from ufl_origami.scene import Scene
@@ -100,20 +100,8 @@ def hold_stiff_folds(springs: Sequence[Spring], constraints: Constraints) -> Non
                 raise SceneError(f"{label}: it must join the crease's first panel and another")
             slot = spring.crease.spring.slot[:, 0]
             dofs = 3 * constraints.configuration.nv + slot
-            constraints.add(dofs, held_angle(spring), label)
-
-
-def held_angle(spring: Spring) -> Callable[[float], np.ndarray]:
-    """Function of time giving the virtual angles (n,) of a stiff fold."""
-    sign, rest = spring.crease.spring.coefficient[:, 0], spring.spec.rest_angle
-    if rest is None:
-        shape = sign * spring.rest
-        return lambda time: shape
-    if callable(rest):
-        function: Callable[[float], float] = rest
-        return lambda time: sign * function(time)
-    number = rest
-    return lambda time: sign * number
+            sign = spring.crease.spring.coefficient[:, 0]
+            constraints.add(dofs, held_angle(spring.spec, sign, spring.rest), label)
 
 
 def first_springs(springs: Sequence[Spring]) -> dict[str, CreaseModel]:

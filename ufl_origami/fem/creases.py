@@ -8,7 +8,7 @@ import numpy as np
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.constraints import Constraints
 from ufl_origami.crease_laws import CreaseLaw, LinearLaw
-from ufl_origami.declared import declared_springs
+from ufl_origami.declared import declared_springs, held_angle
 from ufl_origami.errors import SceneError
 from ufl_origami.fem.unknowns import fold_angle_names
 from ufl_origami.scene import Scene
@@ -214,17 +214,5 @@ def hold_stiff_folds(springs: list[FemSpring], constraints: Constraints) -> None
         if 0 not in spring.crease.sides:
             raise SceneError(f"{label}: it must join the crease's first panel and another")
         dofs = 3 * constraints.configuration.nv + spring.crease.slot[:, :, 0]
-        constraints.add(dofs.ravel(), _held_angle(spring), label)
-
-
-def _held_angle(spring: FemSpring) -> Callable[[float], np.ndarray]:
-    """Function of time giving the virtual angles (2 n,) of a stiff fold."""
-    sign, rest = np.repeat(spring.crease.coefficient[:, 0], 2), spring.spec.rest_angle
-    if rest is None:
-        shape = sign * np.repeat(spring.rest, 2)
-        return lambda time: shape
-    if callable(rest):
-        function: Callable[[float], float] = rest
-        return lambda time: sign * function(time)
-    number = rest
-    return lambda time: sign * number
+        sign, rest = np.repeat([spring.crease.coefficient[:, 0], spring.rest], 2, axis=1)
+        constraints.add(dofs.ravel(), held_angle(spring.spec, sign, rest), label)
