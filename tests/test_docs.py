@@ -163,6 +163,7 @@ def test_every_script_has_its_row_in_the_readme(folder):
     assert scripts == set(re.findall(rf"\(({folder}/\w+\.py)\)", README))
 
 
-def test_picture_is_small():
-    (picture,) = re.findall(r"!\[.*\]\((.*)\)", README)
-    assert (ROOT / picture).stat().st_size < 300_000
+def test_pictures_are_small():
+    pictures = re.findall(r"!\[.*\]\((.*)\)", README)
+    assert pictures
+    assert all((ROOT / picture).stat().st_size < 300_000 for picture in pictures)

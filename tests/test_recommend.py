@@ -20,7 +20,6 @@ from ufl_origami.scene import Scene
 from ufl_origami.solvers.static import StepSettings
 from ufl_origami.work_precision import read_points, write_points
 
-pytestmark = pytest.mark.mpi
 ETA = 0.5
 
 
@@ -83,6 +82,7 @@ def test_the_cheapest_method_is_taken(tmp_path):
         assert made.options.get("bending", "") == {"director": "director", "fem": ""}[method]
 
 
+@pytest.mark.mpi
 def test_sizes_grow_with_the_panels():
     small, large = (uo.recommend(fold(0.3 * s, scale=s), 0.01) for s in (1.0, 7.0))
     assert large.size == pytest.approx(7 * small.size, rel=1e-9)
@@ -109,6 +109,7 @@ def test_likeness_of_scenes(sheet, kind):
     assert kind_of_scene(sheet()) == kind
 
 
+@pytest.mark.mpi
 def test_shapes_of_panels_are_exact(comm):
     shapes = panel_shapes(rectangle(6.0, 1.5, 3, structure="unstructured"))
     assert shapes.area == pytest.approx([9.0], rel=1e-12)
@@ -125,6 +126,7 @@ def test_tolerances_that_are_no_positive_number_are_refused(tolerance):
         uo.recommend(fold(), tolerance)
 
 
+@pytest.mark.mpi
 def test_a_tolerance_beyond_the_table_names_the_best_measured():
     with pytest.raises(InputError, match=r"tighter than all.*'z_fold'.*the best is (\S+)") as told:
         uo.recommend(fold(), 1e-9)
