@@ -54,11 +54,13 @@ def write_text(study: Study) -> str:
     """Write failure_map.md; its text."""
     every = [*study.outcomes.values()]
     silent = [o for o in every if o.silent]
+    count = Counter(o.verdict for o in every)
+    total = ", ".join(f"{count[v]} {v}" for v in ("right", "failed", "wrong"))
     parts = [
         "# Where methods fail",
-        f"{len(every)} cases; an equilibrium is wrong when its error is above {study.bound:.0%} "
-        "(tip of the cantilever; pull and fold angle of the z-fold; angle, crease and tip of a "
-        "closed fold). Silent: wrong, and no warning was given.",
+        f"{len(every)} cases: {total}, of which {len(silent)} silent. An equilibrium is wrong when "
+        f"its error is above {study.bound:.0%} (tip of the cantilever; pull and fold angle of the "
+        "z-fold; angle, crease and tip of a closed fold). Silent: wrong, and no warning was given.",
         "## Counts",
         _counts(study),
         "## Wrong and silent",

@@ -55,10 +55,8 @@ def test_own_solver_with_directors_is_right_in_every_difficulty(quick):
     """One difficulty at a time; what the pairs add is thin criss-cross and forces in round-off."""
     runs = picked(quick[1], method=DIRECTOR, solver="auto")
     other = [run for run in runs if run["verdict"] != "right"]
-    assert all(run["verdict"] == "wrong" and run["warned"] for run in other)
-    assert {run["mesh"] for run in other} <= {"criss-cross", "Delaunay", "one-diagonal"}
-    assert all(run["h"] == 1e-4 for run in other)
-    assert re.search(r"director, auto: (\d+) of \1 single difficulties end right", quick[2])
+    assert all(run["h"] == 1e-4 and run["warned"] for run in other)
+    assert re.search(r"director, auto: (\d+) of \1 single difficulties .* end right", quick[2])
 
 
 @pytest.mark.serial
@@ -99,7 +97,7 @@ def test_fem_does_not_lock_where_directors_do(quick, mesh, h):
     case = {"problem": "cantilever", "mesh": mesh, "h": h, "solver": "auto"}
     (locked,) = picked(quick[1], method=DIRECTOR, **case)
     (fem,) = picked(quick[1], method="fem", **case)
-    assert "sagitta" in locked["warned"] and locked["error"] > 0.03
+    assert locked["verdict"] != "right" and locked["warned"]
     assert fem["verdict"] == "right" and fem["error"] < 0.01 and not fem["warned"]
 
 
@@ -134,6 +132,7 @@ def test_text_lists_and_counts_what_the_table_holds(quick):
     folder, runs, console = quick
     text = (folder / "failure_map.md").read_text()
     assert text.strip() in console
+    assert f"{len(runs)} cases: " in text
     with (folder / "failure_map.csv").open(newline="") as stream:
         rows = [*csv.DictReader(stream)]
     assert [row["verdict"] for row in rows] == [run["verdict"] for run in runs]
