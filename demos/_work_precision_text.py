@@ -6,7 +6,7 @@ from statistics import median
 from _work_precision_figures import COSTS, NAMES, known
 from _work_precision_problems import METHODS, Problem, own_check
 from _work_precision_runs import MESHES, REPEATS, STEPS, THINNER, Choice, Trial, same
-from _work_precision_verdicts import TOLERANCES, Verdict, judge, methods_of
+from _work_precision_verdicts import TIE, TOLERANCES, Verdict, judge, methods_of
 
 from ufl_origami.work_precision import Cost, Point, order, picked
 
@@ -30,7 +30,8 @@ def factor_text(verdict: Verdict, name: str) -> str:
     """How much dearer a method is than the winner."""
     if verdict.paid[name] is None:
         return f"{TITLES[name]} does not reach it"
-    return f"{TITLES[name]} {number(verdict.factor(name))} times"
+    tie = " (a tie)" if name in verdict.ties else ""
+    return f"{TITLES[name]} {number(verdict.factor(name))} times{tie}"
 
 
 def sentence(verdict: Verdict) -> str:
@@ -92,7 +93,8 @@ def introduction(points: Sequence[Point], ranks: int) -> list[str]:
         f"{elapsed:.2f} seconds passed for each of them.",
         "- A tolerance is met from that mesh on from which all finer ones meet it as well; costs "
         "between two meshes are interpolated on the logarithmic chart, and a finer mesh that costs "
-        'less counts instead. "At most": the coarsest mesh meets it already.',
+        'less counts instead. "At most": the coarsest mesh meets it already. A tie: within '
+        f"{TIE:g} times the seconds of the winner, by which repeated studies differ.",
         "- Errors are relative: included fold angle and pull to those of the elastica, profile "
         "(largest distance of a vertex of the front edge from its place) to the panel's width, the "
         "worse of the two measured displacements to its reference.",
@@ -123,13 +125,15 @@ def tallies(verdicts: Sequence[Verdict]) -> str:
 
 
 def tally(verdicts: Sequence[Verdict], name: str) -> str:
-    """Wins of one method, by what factor it loses else, how often it does not get there."""
-    won = sum(v.winner == name for v in verdicts)
-    lost = [v.factor(name) for v in verdicts if v.winner != name and v.paid.get(name)]
+    """Wins and ties of one method, by what factor it loses else, how often it gets nowhere."""
+    won = sum(v.ties == (name,) for v in verdicts)
+    tied = sum(name in v.ties for v in verdicts) - won
+    lost = [v.factor(name) for v in verdicts if name not in v.ties and v.paid.get(name)]
     missed = sum(name in v.paid and v.paid[name] is None for v in verdicts)
+    shared = f" and ties {tied}" if tied else ""
     behind = f", else {number(median(lost))} times the winner in the median" if lost else ""
     never = f", not reached in {missed}" if missed else ""
-    return f"{TITLES[name]} wins {won}{behind}{never}"
+    return f"{TITLES[name]} wins {won}{shared}{behind}{never}"
 
 
 def winners(verdicts: Sequence[Verdict]) -> list[str]:

@@ -10,6 +10,7 @@ from _work_precision_problems import METHODS, Problem
 from ufl_origami.work_precision import Cost, Point, cost_at, error_names, picked
 
 TOLERANCES = (0.01, 0.001)
+TIE = 1.25  # factor in seconds below which repeated studies may change the order
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,12 @@ class Verdict:
         """Name of the cheapest method, None where none reaches the tolerance."""
         found = {name: cost.value for name, cost in self.paid.items() if cost}
         return min(found, key=lambda name: found[name]) if found else None
+
+    @property
+    def ties(self) -> tuple[str, ...]:
+        """Names of the methods that are as good as the winner, itself among them."""
+        limit = TIE if self.cost == "seconds" else 1.0
+        return tuple(name for name in self.paid if self.factor(name) <= limit)
 
     def factor(self, name: str) -> float:
         """Cost of a method over the winner's, inf where it does not reach the tolerance."""
