@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
+from ufl_origami.recommendation import TABLE
 from ufl_origami.work_precision import Point, order, picked, read_points
 
 pytestmark = pytest.mark.serial  # each test starts its own processes
@@ -120,6 +121,30 @@ def test_text_names_the_winner_of_the_table(quick, tolerance, name, unit, mesh):
         else:
             factor = float(line.split(f"{TITLES[method]} ")[1].split(" times")[0])
             assert factor == pytest.approx(paid[method] / paid[winner], rel=6e-3)
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("thickness", [0.01, 0.001, 0.0001])
+def test_documented_text_is_that_of_the_table_of_recommendations(thickness, mesh):
+    text = (REPO / "docs" / "speed_accuracy.md").read_text()
+    points = [p for p in read_points(TABLE) if (p.problem, p.thickness) == ("z_fold", thickness)]
+    for tolerance in (0.01, 0.001):
+        paid = {m: cost(curve(points, m, mesh), tolerance, "seconds") for m in TITLES}
+        section = text.split(f"Z-fold, {100 * tolerance:g} %, in seconds (largest error):")[1]
+        line = section.split(f"h/W = {thickness:g}, {mesh} mesh: ")[1].splitlines()[0]
+        winner = min(paid, key=paid.get)
+        assert f"**{TITLES[winner]}** wins with {paid[winner]:.3g} s" in line
+
+
+def test_readme_quotes_the_text():
+    """Line breaks apart."""
+    readme, text = (
+        " ".join(path.read_text().split())
+        for path in (REPO / "README.md", REPO / "docs" / "speed_accuracy.md")
+    )
+    quoted = readme.split("it says: - ")[1].split(" `uo.recommend(")[0].split(". - ")
+    assert len(quoted) == 4
+    assert all(sentence.rstrip(".") in text for sentence in quoted)
 
 
 def test_text_states_the_settings(quick):
