@@ -5,8 +5,10 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from ufl_origami.errors import InputError
+from ufl_origami.plotting.work_precision import WorkCurve, WorkPanel, work_precision_chart
 from ufl_origami.work_precision import (
     Cost,
     Point,
@@ -102,3 +104,12 @@ def test_other_tables_are_refused(tmp_path, change, message):
     file.write_text(file.read_text().replace(*change))
     with pytest.raises(InputError, match=message):
         read_points(file)
+
+
+def test_chart_of_two_methods_is_drawn_and_an_empty_one_refused(tmp_path):
+    curves = [WorkCurve([0.1, 1.0], [0.1, 1e-3], m, "structured") for m in ("one", "other")]
+    panels = [WorkPanel("a", "error", curves), WorkPanel("b", "error", curves[:1])]
+    file = work_precision_chart(panels, tmp_path / "c.png", columns=2, abscissa="s", least=1e-4)
+    assert imread(file).std() > 0.05
+    with pytest.raises(InputError, match="nothing to draw"):
+        work_precision_chart([WorkPanel("a", "error", [])], file, columns=1, abscissa="s")
