@@ -176,6 +176,7 @@ def test_a_moving_rest_angle_folds_a_free_sheet_without_stress():
     assert angles.mesh == pytest.approx(np.full(len(angles.mesh), 2.0), abs=1e-7)
 
 
+@pytest.mark.filterwarnings("ignore::ufl_origami.errors.BranchWarning")
 def test_a_stiffness_that_grows_in_time_is_followed():
     sheet = mesh_pattern(flat_strip(), 0.25, structure="structured")
     scene = Scene(sheet, Material(E, 0.0, H))

@@ -25,6 +25,7 @@ _HOMES = {
     "NewtonSolver": "solvers.newton",
     "StaticPath": "solvers.static",
     "MeshWarning": "errors",
+    "BranchWarning": "errors",
     "StabilityWarning": "errors",
     "RoundOffWarning": "errors",
     "SupportWarning": "errors",

@@ -41,6 +41,10 @@ class StabilityWarning(UserWarning):
     """An accepted equilibrium with negative directions of the tangent: it is unstable."""
 
 
+class BranchWarning(UserWarning):
+    """An accepted equilibrium that was found far from the predicted one: the branch may differ."""
+
+
 class RoundOffWarning(UserWarning):
     """Forces that are smaller than the round-off of the residual: the message tells by how much."""
 

@@ -96,6 +96,7 @@ def solve_static(
         SupportWarning: a piece of the sheet may turn freely.
         MeshWarning: the mesh cannot represent the form, or the curvature that was found.
         StabilityWarning: an accepted state is unstable.
+        BranchWarning: an accepted state was found far from the predicted one.
         RoundOffWarning: the forces at the end are smaller than their round-off.
     """
     if resume and output is None:

@@ -74,6 +74,8 @@ class NewtonReport:
         iterations: linear solves, the predictor included.
         factorisations: factorisations, those of the guard included.
         residuals: residual norm before each iteration.
+        searched: whether the watchdog had to search.
+        strayed: distance of the solution from the predicted state over the predicted step.
     """
 
     converged: bool = False
@@ -81,6 +83,8 @@ class NewtonReport:
     iterations: int = 0
     factorisations: int = 0
     residuals: list[float] = field(default_factory=list)
+    searched: bool = False
+    strayed: float = 0.0
 
 
 class NewtonSolver:
@@ -245,6 +249,7 @@ class NewtonSolver:
             if self._full_steps(x):
                 self.report.converged = True
                 return self.report
+            self.report.searched |= search
             if search and cycle + 1 < settings.cycles and self._line_search(start, x, 4 * 2**cycle):
                 self.report.converged = True
                 return self.report

@@ -19,11 +19,14 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.errors import InputError, SolveError, StabilityWarning
+from ufl_origami.errors import BranchWarning, InputError, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
 
 log = logging.getLogger(__name__)
+
+NEGLIGIBLE = 1e-3
+"""Distance over the sheet's size below which no branch is lost."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class StepSettings:
         retreats: how often a step that does not converge in one run of full Newton steps is cut
             before Newton's watchdog may search further off: what it finds far away may lie on
             another branch.
+        stray: distance of the solution from the predicted state, over the predicted step, from
+            which on a step is cut as well, twice `retreats` times at most; then a warning tells.
         easy: Newton iterations up to which a step is easy.
     """
 
@@ -50,6 +55,7 @@ class StepSettings:
     growth: float = 1.5
     easy: int = 9
     retreats: int = 3
+    stray: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -154,15 +160,19 @@ class StaticPath:
 
     def _advance(self, x: PETSc.Vec, time: float, target: float) -> Step:
         """One accepted step towards target, cut as often as needed."""
-        begin, cuts = clock.perf_counter(), 0
+        begin, cuts, wanted, last = clock.perf_counter(), 0, target, False
         iterations = factorisations = 0
         while True:
             may_cut = 0.5 * (target - time) >= self.settings.smallest
-            search = cuts >= self.settings.retreats or not may_cut
+            search = cuts >= self.settings.retreats or last or not may_cut
             trial, report = self._try(x, time, target, search=search)
+            far = report.searched or report.strayed > self.settings.stray
             iterations += report.iterations
             factorisations += report.factorisations
             why = self._refusal(trial, report)
+            retreat = may_cut and not last and cuts < 2 * self.settings.retreats
+            if not why and retreat and far and not report.searched:
+                why = "the state found is further from the predicted one than the step is long"
             if not why:
                 break
             if self._unstable and not self.newton.allowed:
@@ -171,8 +181,13 @@ class StaticPath:
                 self._factor_at(x, time)
                 continue
             size = 0.5 * (target - time)
+            if size < self.settings.smallest and target != wanted:
+                log.info("step to %g failed (%s), search from the whole step", target, why)
+                target, last = wanted, True
+                self._factor_at(x, time)
+                continue
             log.info("step to %g failed (%s), cut to %g", target, why, size)
-            if size < self.settings.smallest:
+            if last or size < self.settings.smallest:
                 self.problem.set_time(time)
                 smallest = f"step below the smallest size {self.settings.smallest:g}"
                 raise SolveError(f"{smallest}: {why}", time)
@@ -180,6 +195,9 @@ class StaticPath:
             self._factor_at(x, time)
         trial.copy(x)
         self.problem.accept(x)
+        if far:
+            text = f"state at {target:g} was found far from the predicted one: it may be on another"
+            warnings.warn(f"{text} branch; compare with smaller steps", BranchWarning, stacklevel=3)
         self.newton.report = NewtonReport()
         self.newton.allowed = 0
         negative = self._factor_at(x, target)
@@ -213,11 +231,24 @@ class StaticPath:
         """Predictor and Newton from an accepted state whose tangent is factored."""
         self.newton.report = NewtonReport(iterations=1)
         trial = self._predict(x, target)
+        predicted = trial.copy()
         turn = self.problem.largest_turn(x, trial)
         if turn >= self.settings.turn:
             self.newton.report.reason = f"an angle would turn by {np.degrees(turn):.0f} deg"
             return trial, self.newton.report
-        return trial, self.newton.solve(trial, x, search=search)
+        report = self.newton.solve(trial, x, search=search)
+        step, off = self._length(x, predicted), self._length(predicted, trial)
+        report.strayed = off / step if off > NEGLIGIBLE else 0.0
+        return trial, report
+
+    def _length(self, start: PETSc.Vec, end: PETSc.Vec) -> float:
+        """Norm of the displacements between two states over that of the vertices' places."""
+        configuration = self.problem.configuration
+        owned = configuration.nv_owned
+        change = end.array_r[: 3 * owned] - start.array_r[: 3 * owned]
+        rest = configuration.sheet.rest[:owned].ravel()
+        moved, size = configuration.sum([change @ change, rest @ rest])
+        return float(np.sqrt(moved / size))
 
     def _predict(self, x: PETSc.Vec, target: float) -> PETSc.Vec:
         """Linear solution of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
