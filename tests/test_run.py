@@ -164,6 +164,7 @@ def test_killed_run_resumes_to_the_same_bits(folder, whole, place):
     assert len(list((folder / "checkpoint").iterdir())) == 2
 
 
+@pytest.mark.filterwarnings("ignore::ufl_origami.errors.BranchWarning")
 @pytest.mark.serial
 def test_resume_keeps_the_memory_of_the_guard(folder):
     """A strip that buckled needed a shift; what follows starts from it, to the same bits."""
