@@ -26,6 +26,7 @@ def demo(folder, *words, ranks=1):
     env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
     env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
     env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    env["OMPI_MCA_mpi_yield_when_idle"] = "1"  # the ranks may share cores with others
     mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
     command = [*mpirun, sys.executable, str(REPO / "demos" / "failure_map.py"), *words]
     done = subprocess.run(
@@ -161,16 +162,18 @@ def test_maps_are_drawn(quick):
 @pytest.mark.slow
 @pytest.mark.serial
 def test_two_ranks_find_the_same(quick, tmp_path):
-    """Verdicts and warnings but for cases whose round-off decides; errors where both are right."""
+    """The same grid; the same errors but where round-off decides (thin, or led by an edge)."""
     demo(tmp_path, "--quick", ranks=2)
     two = json.loads((tmp_path / "summary.json").read_text())["runs"]
     keys = ("problem", "mesh", "h", "eta", "steps", "angle", "method", "solver", "triangles")
     assert [[run[k] for k in keys] for run in two] == [[run[k] for k in keys] for run in quick[1]]
     own = [(a, b) for a, b in zip(quick[1], two, strict=True) if a["solver"] == "auto"]
-    for one, other in own:
-        assert one["verdict"] == other["verdict"]
-        if one["h"] == 0.01 and one["problem"] != "closed by edge":
-            assert one["error"] == pytest.approx(other["error"], abs=1e-4)
+    steady = [pair for pair in own if pair[0]["h"] == 0.01]
+    steady = [pair for pair in steady if pair[0]["problem"] != "closed by edge"]
+    assert len(steady) > 20
+    for one, other in steady:
+        assert one["error"] == pytest.approx(other["error"], abs=1e-5)
+        assert (one["verdict"], one["warned"]) == (other["verdict"], other["warned"])
 
 
 @pytest.mark.mpi
