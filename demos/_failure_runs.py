@@ -11,6 +11,7 @@ from _failure_cases import Method, Setting, Sheets, Task, task
 
 from ufl_origami.discretise import build
 from ufl_origami.errors import (
+    BranchWarning,
     MeshWarning,
     RoundOffWarning,
     SolveError,
@@ -28,6 +29,7 @@ from ufl_origami.supports import check_supports
 BUDGET = 1000  # Newton iterations of one case, after which no further try is begun
 SMALLEST = 1e-3  # step at which the automatic solver gives up
 KINDS = {
+    BranchWarning: "branch",
     MeshWarning: "mesh",
     RoundOffWarning: "round-off",
     StabilityWarning: "unstable",
