@@ -32,6 +32,9 @@ SHIFT_FACTOR = 8.0
 SHIFT_TRIES = 40
 """Shifts that the guard tries at one tangent."""
 
+MANY = 1e4
+"""Unknowns above which the tolerance floor grows with the root of their number."""
+
 REASONS = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
 
 
@@ -168,8 +171,9 @@ class NewtonSolver:
         self._floor = self._round_off(x)
 
     def _round_off(self, x: PETSc.Vec) -> float:
-        """Tolerance that the residual's round-off allows."""
-        return self.settings.floor * self.problem.round_off(x)
+        """Tolerance that the residual's round-off allows: its norm grows with the unknowns."""
+        many = max(1.0, np.sqrt(x.getSize() / MANY))
+        return self.settings.floor * many * self.problem.round_off(x)
 
     def factor(self, ksp: PETSc.KSP, *, shift: bool = True) -> int | None:
         """Factor the constrained tangent; with the guard, shift it until positive definite.

@@ -114,6 +114,7 @@ class StaticPath:
     steps: list[Step] = field(default_factory=list)
     size: float | None = None
     _unstable: int = 0
+    _effort: int = 0
 
     def run(
         self, x: PETSc.Vec, start: float, stops: Sequence[float], on_accept: OnAccept | None = None
@@ -142,7 +143,7 @@ class StaticPath:
                 time = step.time
                 if target != stop or step.cuts:
                     size = step.size
-                if step.iterations <= self.settings.easy:
+                if self._effort <= self.settings.easy:
                     size = min(self.settings.growth * size, self.settings.largest)
                 self.size = size
                 if on_accept:
@@ -164,13 +165,14 @@ class StaticPath:
         iterations = factorisations = 0
         while True:
             may_cut = 0.5 * (target - time) >= self.settings.smallest
-            search = cuts >= self.settings.retreats or last or not may_cut
+            hurried = last or not may_cut or bool(self._unstable)
+            search = cuts >= self.settings.retreats or hurried
             trial, report = self._try(x, time, target, search=search)
             far = report.searched or report.strayed > self.settings.stray
             iterations += report.iterations
             factorisations += report.factorisations
             why = self._refusal(trial, report)
-            retreat = may_cut and not last and cuts < 2 * self.settings.retreats
+            retreat = not hurried and cuts < 2 * self.settings.retreats
             if not why and retreat and far and not report.searched:
                 why = "the state found is further from the predicted one than the step is long"
             if not why:
@@ -194,6 +196,7 @@ class StaticPath:
             target, cuts = time + size, cuts + 1
             self._factor_at(x, time)
         trial.copy(x)
+        self._effort = report.iterations
         self.problem.accept(x)
         if far:
             text = f"state at {target:g} was found far from the predicted one: it may be on another"
