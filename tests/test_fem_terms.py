@@ -207,7 +207,7 @@ def residuals(load):
     model = build(problem.scene)
     solver = NewtonSolver(model.problem, NewtonSettings(method="newton", rtol=0.0))
     reports, solve = [], solver.solve
-    solver.solve = lambda *args: reports.append(solve(*args)) or reports[-1]
+    solver.solve = lambda *args, **kw: reports.append(solve(*args, **kw)) or reports[-1]
     StaticPath(model.problem, solver, StepSettings(first=load)).run(model.x, 0.0, [load])
     return np.array(reports[0].residuals)
 
