@@ -8,6 +8,23 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 _HOMES = {
+    "AccuracyWarning": "errors",
+    "Anisotropic": "friction_laws",
+    "Barrier": "barrier",
+    "Box": "obstacles",
+    "ContactWarning": "errors",
+    "Coulomb": "friction_laws",
+    "Cylinder": "obstacles",
+    "Direction": "friction_laws",
+    "DynamicResult": "dynamics",
+    "OneWay": "friction_laws",
+    "Plane": "obstacles",
+    "SignedDistance": "obstacles",
+    "Sphere": "obstacles",
+    "TimeSettings": "solvers.dynamics",
+    "solve_dynamic": "dynamics",
+    "spin": "scene_surroundings",
+    "suggest_barrier": "suggestions",
     "CreasePattern": "pattern",
     "Material": "material",
     "MeshError": "errors",

@@ -8,11 +8,12 @@ leaves either the state before or the state after. Values are keyed by the input
 
 import json
 import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import numpy as np
 
@@ -21,30 +22,16 @@ from ufl_origami.errors import InputError
 from ufl_origami.identity import declaration, sheet_digest
 from ufl_origami.model import Model
 from ufl_origami.shares import Finder, Shares
-from ufl_origami.solvers.static import Step
-from ufl_origami.terms.base import Keyed
+from ufl_origami.terms.base import Keyed, Term
 
-FORMAT = 1
+FORMAT = 2
 MANIFEST = "manifest.json"
 ENERGY_TOLERANCE = 1e-9
 """Relative to the largest energy: a restored state differs by the order of summation alone."""
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How far a run has come, and what its solver remembers.
-
-    Attributes:
-        time: load factor or time of the state.
-        steps: accepted steps.
-        size: size of the next step, None: the first one of the settings.
-        shift: diagonal shift of the solver's guard.
-    """
-
-    time: float
-    steps: list[Step]
-    size: float | None
-    shift: float
+Memory = dict[str, Any]
+"""Values of a run that JSON can hold."""
 
 
 class Checkpoint:
@@ -53,12 +40,13 @@ class Checkpoint:
     Args:
         model: the model, whose current state is written or set.
         folder: made when the first checkpoint is written.
+        terms: terms whose memories belong to the state.
     """
 
-    def __init__(self, model: Model, folder: str | Path):
+    def __init__(self, model: Model, folder: str | Path, terms: Sequence[Term]):
         self.model, self.folder = model, Path(folder)
         self.comm = model.sheet.comm
-        self._shares = Shares(model)
+        self._shares = Shares(model, terms)
         self._identity = {"sheet": sheet_digest(model.sheet)} | declaration(model.scene)
 
     def clear(self) -> None:
@@ -70,19 +58,25 @@ class Checkpoint:
 
         on_rank0(self.comm, forget)
 
-    def write(self, progress: Progress) -> None:
+    def write(self, number: int, memory: Memory, vectors: Mapping[str, PETSc.Vec]) -> None:
         """Write the model's current state; collective.
+
+        Args:
+            number: of the step.
+            memory: what the run needs to go on.
+            vectors: further vectors of unknowns by name.
 
         Raises:
             OSError: a file could not be written; the checkpoint before stays valid.
         """
-        shares = self._shares.get()
-        number = len(progress.steps)
+        shares = self._shares.get(vectors)
         energies = self.model.energies()
         _everywhere(self.comm, lambda: _write_part(self._part(number, self.comm.rank), shares))
-        manifest = asdict(progress) | {
+        manifest = memory | {
             "format": FORMAT,
             "scene": self._identity,
+            "time": self.model.problem.time,
+            "number": number,
             "energies": energies,
             "parts": [self._part(number, rank).name for rank in range(self.comm.size)],
         }
@@ -93,13 +87,16 @@ class Checkpoint:
 
     def _publish(self, manifest: dict) -> None:
         """Make a complete checkpoint the valid one, then delete the parts of all others."""
-        replace(self.folder / MANIFEST, json.dumps(manifest, indent=1).encode())
+        replace(self.folder / MANIFEST, json.dumps(manifest).encode())
         for path in self.folder.glob("step*-rank*.npz*"):
             if path.name not in manifest["parts"]:
                 path.unlink()
 
-    def read(self) -> Progress:
+    def read(self, vectors: Mapping[str, PETSc.Vec]) -> Memory:
         """Put the model into the stored state; collective.
+
+        Args:
+            vectors: those that were written with it, to be set.
 
         Raises:
             InputError: no checkpoint, one of another scene, or an incomplete one.
@@ -107,17 +104,13 @@ class Checkpoint:
         manifest = self.comm.bcast(on_rank0(self.comm, self._read_manifest), root=0)
         self._require_same_scene(manifest["scene"])
         self.model.problem.set_time(manifest["time"])
-        _everywhere(self.comm, lambda: self._take([self.folder / p for p in manifest["parts"]]))
-        self.model.x.assemble()
-        progress = Progress(
-            manifest["time"],
-            [Step(**step) for step in manifest["steps"]],
-            manifest["size"],
-            manifest["shift"],
-        )
-        if progress.steps:
+        parts = [self.folder / part for part in manifest["parts"]]
+        _everywhere(self.comm, lambda: self._take(parts, vectors))
+        for vector in (self.model.x, *vectors.values()):
+            vector.assemble()
+        if manifest["number"]:
             self._require_same_energies(manifest["energies"])
-        return progress
+        return manifest
 
     def _read_manifest(self) -> dict:
         path = self.folder / MANIFEST
@@ -148,9 +141,9 @@ class Checkpoint:
                     f"{before!r}, now it is {after!r}"
                 )
 
-    def _take(self, parts: list[Path]) -> None:
+    def _take(self, parts: list[Path], vectors: Mapping[str, PETSc.Vec]) -> None:
         """Find this rank's values in all parts and set them."""
-        finders = {label: Finder(share) for label, share in self._shares.get().items()}
+        finders = {label: Finder(share) for label, share in self._shares.get(vectors).items()}
         for path in parts:
             with np.load(path, allow_pickle=False) as archive:
                 for label in finders.keys() & {name.removesuffix(".keys") for name in archive}:
@@ -158,7 +151,8 @@ class Checkpoint:
         for label, finder in finders.items():
             if finder.missing:
                 raise InputError(f"{self.folder} lacks {finder.missing} values of {label!r}")
-        self._shares.set({label: finder.values for label, finder in finders.items()})
+        values = {label: finder.values for label, finder in finders.items()}
+        self._shares.set(values, vectors)
 
 
 def _write_part(path: Path, shares: dict[str, Keyed]) -> None:

@@ -43,3 +43,8 @@ def assemble_into(matrix: la.MatrixCSR, form: fem.Form) -> None:
     """Assemble a bilinear form of one process into its own matrix."""
     matrix.data[:] = 0.0
     fem.assemble_matrix(matrix, form)  # type: ignore[arg-type]
+
+
+def local_matrix(form: fem.Form):
+    """This process's share of a bilinear form, ghosts included, as a SciPy matrix."""
+    return fem.assemble_matrix(form).to_scipy(ghosted=True)

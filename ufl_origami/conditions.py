@@ -1,6 +1,7 @@
 """What a scene's conditions, loads and materials come to in any discretisation."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ufl_origami.constraints import Constraints
 from ufl_origami.errors import SceneError
 from ufl_origami.model import place_nodes, place_vertices
 from ufl_origami.scene import Scene
-from ufl_origami.scene_parts import ClampSpec, LoadSpec, displacement_function
+from ufl_origami.scene_parts import ClampSpec, LoadFactor, displacement_function
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeSides, side_ends
 from ufl_origami.terms import loads
@@ -68,7 +69,7 @@ def clamp_tangent(clamp: ClampSpec, rest: np.ndarray) -> Callable[[float], np.nd
     return lambda time: np.broadcast_to(tangent(time, rest), rest.shape)
 
 
-def make_constraints(scene: Scene, configuration: Configuration) -> Constraints:
+def make_constraints(scene: Scene, configuration: Configuration, factor: LoadFactor) -> Constraints:
     """Prescribed displacements."""
     constraints = Constraints(configuration)
     for spec in scene.motions:
@@ -76,45 +77,47 @@ def make_constraints(scene: Scene, configuration: Configuration) -> Constraints:
         for axis, value in enumerate(spec.components):
             if value is not None:
                 label = f"move {spec.name!r} {'xyz'[axis]}"
-                f = displacement_function(value, nodes.rest, label)
+                f = displacement_function(value, nodes.rest, label, factor)
                 constraints.add(nodes.dofs[:, axis], f, label)
     return constraints
 
 
-MomentMaker = Callable[[LoadSpec], Term]
+MomentMaker = Callable[[str, loads.Amplitude], Term]
 
 
 def load_terms(
-    scene: Scene, configuration: Configuration, functions: SheetFunctions, moment: MomentMaker
+    scene: Scene,
+    configuration: Configuration,
+    functions: SheetFunctions,
+    factor: LoadFactor,
+    moment: MomentMaker,
 ) -> list[Term]:
     """One term a load; `moment` makes those of edge moments, which turn the model's own normals."""
-    makers = {
-        "point": point_load,
-        "line": line_load,
-        "area": area_load,
-        "pressure": pressure_load,
+    makers: dict[str, Callable[[str, Callable], Term]] = {
+        "point": partial(point_load, configuration),
+        "line": partial(line_load, configuration),
+        "area": partial(area_load, functions),
+        "pressure": partial(pressure_load, functions),
+        "moment": moment,
     }
-    return [
-        moment(spec) if spec.kind == "moment" else makers[spec.kind](configuration, functions, spec)
-        for spec in scene.loads
-    ]
+    return [makers[spec.kind](spec.name, spec.function(factor)) for spec in scene.loads]
 
 
-def point_load(configuration: Configuration, functions: SheetFunctions, spec: LoadSpec) -> Term:
+def point_load(configuration: Configuration, name: str, force: loads.VectorFunction) -> Term:
     """Dead force on the rank that owns the point."""
-    vertices = place_vertices(configuration.sheet, spec.name)
+    vertices = place_vertices(configuration.sheet, name)
     vertices = vertices[vertices < configuration.nv_owned]
     dofs = 3 * vertices[:, None] + np.arange(3)
-    return loads.NodalLoad(dofs, np.ones(len(vertices)), spec.value)
+    return loads.NodalLoad(dofs, np.ones(len(vertices)), force)
 
 
-def line_load(configuration: Configuration, functions: SheetFunctions, spec: LoadSpec) -> Term:
+def line_load(configuration: Configuration, name: str, force: loads.VectorFunction) -> Term:
     """Dead force per rest length of each owned edge, on the nodes by their shape functions.
 
     That is half of it to either end, or a sixth to either end and the rest to the midpoint.
     """
     sheet = configuration.sheet
-    facets = sheet.edge_facets(spec.name)
+    facets = sheet.edge_facets(name)
     facets = facets[facets < sheet.num_owned_edges]
     ends = sheet.edge_vertices()[facets]
     length = np.linalg.norm(sheet.rest[ends[:, 1]] - sheet.rest[ends[:, 0]], axis=1)
@@ -122,7 +125,7 @@ def line_load(configuration: Configuration, functions: SheetFunctions, spec: Loa
     if configuration.has_midpoints:
         dofs = np.concatenate([dofs, configuration.middle_dofs(facets)[:, None]], axis=1)
         share = np.array([1, 1, 4]) / 6
-    return loads.NodalLoad(dofs.reshape(-1, 3), np.outer(length, share).ravel(), spec.value)
+    return loads.NodalLoad(dofs.reshape(-1, 3), np.outer(length, share).ravel(), force)
 
 
 def _panel_indicator(sheet: SheetMesh, name: str) -> np.ndarray:
@@ -131,16 +134,14 @@ def _panel_indicator(sheet: SheetMesh, name: str) -> np.ndarray:
     return indicator
 
 
-def area_load(configuration: Configuration, functions: SheetFunctions, spec: LoadSpec) -> Term:
+def area_load(functions: SheetFunctions, name: str, force: loads.VectorFunction) -> Term:
     """Dead force per rest area."""
-    density = _panel_indicator(configuration.sheet, spec.name)
-    return loads.area_load(functions, density, spec.value)
+    return loads.area_load(functions, _panel_indicator(functions.sheet, name), force)
 
 
-def pressure_load(configuration: Configuration, functions: SheetFunctions, spec: LoadSpec) -> Term:
+def pressure_load(functions: SheetFunctions, name: str, pressure: loads.Amplitude) -> Term:
     """Follower pressure."""
-    density = _panel_indicator(configuration.sheet, spec.name)
-    return loads.follower_pressure(functions, density, spec.value)
+    return loads.follower_pressure(functions, _panel_indicator(functions.sheet, name), pressure)
 
 
 def moment_sides(scene: Scene, sides: EdgeSides, name: str) -> np.ndarray:

@@ -65,6 +65,11 @@ class State:
         """Edge unknowns (ns,): virtual fold angles and directors, radians."""
         return self.q[3 * len(self.x) :]
 
+    def moved(self, step: np.ndarray) -> "State":
+        """State after an increment (3 nv + ns,) of the unknowns, at the same time."""
+        nodes = step[: 3 * len(self.x)].reshape(-1, 3)
+        return State(self.q + step, self.x + nodes, self.time)
+
 
 MIDDLE = ("middle_x", "middle_y", "middle_z")
 """Edge unknowns that are the displacement of the edge's midpoint, in models of second order."""
@@ -166,6 +171,11 @@ class Configuration:
         """Local view of a global vector of unknowns."""
         q = self.to_local(vector)
         return State(q, self.sheet.rest + q[: 3 * self.nv].reshape(-1, 3), time)
+
+    def owns(self, local: np.ndarray) -> np.ndarray:
+        """Whether this rank owns each of some local unknowns, an array of their shape."""
+        owned = self.global_ids[local] - self.offset
+        return (owned >= 0) & (owned < self.size_local)
 
     def owned_dofs(self, local: np.ndarray) -> np.ndarray:
         """Positions in the owned part of the global vector of those local unknowns it owns."""

@@ -21,7 +21,7 @@ from ufl_origami.model import Model
 from ufl_origami.problem import Problem
 from ufl_origami.quality import warn_mesh
 from ufl_origami.scene import Scene
-from ufl_origami.scene_parts import LoadSpec
+from ufl_origami.scene_parts import LoadFactor
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan, EdgeSides, edge_fan, edge_sides, side_ends
 from ufl_origami.springs import (
@@ -37,6 +37,7 @@ from ufl_origami.stencils import (
     fold_angle_name,
     shell_batches,
 )
+from ufl_origami.surroundings import surrounding_terms
 from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.form import SheetFunctions
@@ -73,18 +74,21 @@ def build_ddg(scene: Scene) -> Model:
     springs = crease_springs(scene, configuration, fans, rest_angles)
     functions = SheetFunctions.create(configuration)
     terms = [shell, *spring_terms(springs, configuration)]
-    terms += load_terms(
-        scene, configuration, functions, partial(edge_moment, scene, configuration, sides)
-    )
+    factor = LoadFactor()
+    moment = partial(edge_moment, scene, configuration, sides)
+    terms += load_terms(scene, configuration, functions, factor, moment)
     if scene.membrane == "ufl":
         terms.append(MembraneForm(functions, panel_data(scene)))
-    terms += [maker(configuration, functions) for maker in scene.terms]
-    constraints = make_constraints(scene, configuration)
+    around, in_time = surrounding_terms(scene, configuration, functions, factor)
+    terms += around + [maker(configuration, functions) for maker in scene.terms]
+    constraints = make_constraints(scene, configuration, factor)
     hold_stiff_folds(springs, constraints)
     problem = Problem(configuration, terms, constraints)
     problem.set_time(0.0)
     creases = first_springs(springs)
-    return Model(sheet, configuration, problem, shell, creases, x, scene)
+    return Model(
+        sheet, configuration, problem, shell, creases, x, scene, factor, functions, in_time
+    )
 
 
 def rest_fold_angles(sheet: SheetMesh, fan: EdgeFan) -> np.ndarray:
@@ -124,11 +128,11 @@ def shell_term(
 
 
 def edge_moment(
-    scene: Scene, configuration: Configuration, sides: EdgeSides, spec: LoadSpec
+    scene: Scene, configuration: Configuration, sides: EdgeSides, name: str, moment: loads.Amplitude
 ) -> Term:
     """Moment on the owned triangles' sides of a boundary."""
     sheet = scene.sheet
-    owned = moment_sides(scene, sides, spec.name)
+    owned = moment_sides(scene, sides, name)
     ends = side_ends(sheet, owned)
     verts = np.column_stack([ends, sheet.cells.ravel()[owned], ends[:, 0]]).astype(np.int32)
     slots = np.zeros((len(owned), 0), dtype=np.int32)
@@ -145,4 +149,4 @@ def edge_moment(
     position = (3 * verts[:, :, None] + np.arange(3)).reshape(n, 12)
     dofs = np.hstack([position, 3 * configuration.nv + slots]).astype(np.int32)
     length = np.linalg.norm(sheet.rest[ends[:, 1]] - sheet.rest[ends[:, 0]], axis=1)
-    return loads.EdgeMoment(configuration, hinge, dofs, length, spec.value)
+    return loads.EdgeMoment(configuration, hinge, dofs, length, moment)

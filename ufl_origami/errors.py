@@ -51,3 +51,11 @@ class RoundOffWarning(UserWarning):
 
 class SupportWarning(UserWarning):
     """A piece of the sheet that no condition keeps from turning: a singular tangent at rest."""
+
+
+class AccuracyWarning(UserWarning):
+    """A time step whose local error exceeds the tolerance although it is the smallest allowed."""
+
+
+class ContactWarning(UserWarning):
+    """A gap that has nearly closed: the barrier is weak for the forces on it."""

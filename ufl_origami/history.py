@@ -28,6 +28,7 @@ import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ import numpy as np
 from ufl_origami.errors import InputError
 from ufl_origami.model import Model
 from ufl_origami.sheet import known_name
+from ufl_origami.solvers.dynamics import TimeStep
 from ufl_origami.solvers.static import Step
 
 Value = float | int | str | None
@@ -43,6 +45,10 @@ Row = dict[str, Value]
 STEP_COLUMNS = (
     "step", "load_factor", "step_size", "newton_iterations", "factorisations", "cuts",
     "negative_pivots", "stability", "seconds",
+)  # fmt: skip
+TIME_COLUMNS = (
+    "step", "time", "step_size", "newton_iterations", "factorisations", "cuts",
+    "negative_pivots", "local_error", "seconds",
 )  # fmt: skip
 INTEGERS = frozenset(("step", "newton_iterations", "factorisations", "cuts", "negative_pivots"))
 
@@ -58,6 +64,7 @@ class Record:
         points: named points whose positions are recorded; default all.
         extra: further columns: name -> function of the model (collective), giving a number.
         fields: "vtx", "xdmf", "auto" (VTX where dolfinx has it) or "none".
+        every: time between written fields; 0: each accepted step.
     """
 
     energies: bool = True
@@ -66,6 +73,7 @@ class Record:
     points: Sequence[str] | None = None
     extra: Mapping[str, Callable[[Model], float]] = field(default_factory=dict)
     fields: str = "auto"
+    every: float = 0.0
 
 
 def step_row(step: Step) -> Row:
@@ -77,8 +85,23 @@ def step_row(step: Step) -> Row:
     return dict(zip(STEP_COLUMNS, values, strict=True))
 
 
+def energy_columns(energies: Mapping[str, float]) -> Row:
+    """Columns of the energies by kind and of their sum."""
+    columns: Row = {f"energy_{kind}": value for kind, value in energies.items()}
+    return columns | {"energy_total": sum(energies.values())}
+
+
+def time_row(step: TimeStep) -> Row:
+    """Columns of a step in time."""
+    values = (
+        step.number, step.time, step.size, step.iterations, step.factorisations, step.cuts,
+        step.negative_pivots, step.error, step.seconds,
+    )  # fmt: skip
+    return dict(zip(TIME_COLUMNS, values, strict=True))
+
+
 class Recorder:
-    """Measures a model's current state as a declaration asks.
+    """Measures a model's current state as a declaration asks, but for its energies.
 
     Args:
         model: the model; its state is read when `measure` is called.
@@ -89,7 +112,7 @@ class Recorder:
     """
 
     def __init__(self, model: Model, record: Record):
-        self.model, self.extra, self.energies = model, dict(record.extra), record.energies
+        self.model, self.extra = model, dict(record.extra)
         sheet = model.sheet
         self.reactions = default_supports(model) if record.reactions is None else record.reactions
         self.creases = sheet.creases if record.creases is None else record.creases
@@ -105,10 +128,6 @@ class Recorder:
     def measure(self) -> Row:
         """Columns of the current state; collective."""
         row: Row = {}
-        if self.energies:
-            energies = self.model.energies()
-            row |= {f"energy_{kind}": value for kind, value in energies.items()}
-            row["energy_total"] = sum(energies.values())
         for name in self.reactions:
             row |= _vector(f"reaction_{name}", self.model.reaction(name))
         for name in self.creases:
@@ -198,21 +217,21 @@ class CsvFile:
         self._file.close()
 
 
-def read_history(path: str | Path, steps: int | None = None) -> History:
+def read_history(path: str | Path, count: int | None = None) -> History:
     """Read a history back from its CSV file.
 
     Args:
         path: the file.
-        steps: rows of later steps are left out, an unfinished last row too.
+        count: rows to read; later ones, an unfinished last one too, are left out.
 
     Raises:
         InputError: the file is no history.
     """
     with Path(path).open(newline="") as file:
         reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ())[: len(STEP_COLUMNS)] != STEP_COLUMNS:
+        if tuple(reader.fieldnames or ())[:2] not in (STEP_COLUMNS[:2], TIME_COLUMNS[:2]):
             raise InputError(f"{path} is no history: its columns are {reader.fieldnames}")
-        rows = [row for row in reader if steps is None or int(row["step"] or 0) <= steps]
+        rows = list(islice(reader, count))
     return History([{name: _parse(name, text) for name, text in row.items()} for row in rows])
 
 

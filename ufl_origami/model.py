@@ -8,10 +8,15 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_origami.configuration import Configuration, State, gather_marks
+from ufl_origami.motion import Motion
 from ufl_origami.problem import Problem
 from ufl_origami.scene import Scene
+from ufl_origami.scene_parts import LoadFactor
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan
+from ufl_origami.terms.base import Term
+from ufl_origami.terms.contact import ContactTerm
+from ufl_origami.terms.form import SheetFunctions
 
 
 class CreaseModel(Protocol):
@@ -56,6 +61,11 @@ class Model:
         creases: name -> edges and spring.
         x: current unknowns (global vector), at rest to begin with.
         scene: what the model was built from.
+        load_factor: factor of the numbers that the scene declares.
+        functions: what the scene's forms share.
+        in_time: terms that act in time only: friction.
+        motion: masses and rates, once the model moves.
+        balance: problem whose residual is zero at the current state: with inertia in a time step.
     """
 
     sheet: SheetMesh
@@ -65,6 +75,16 @@ class Model:
     creases: dict[str, CreaseModel]
     x: PETSc.Vec
     scene: Scene
+    load_factor: LoadFactor
+    functions: SheetFunctions
+    in_time: list[Term]
+    motion: Motion | None = None
+    balance: Problem | None = None
+
+    @property
+    def contacts(self) -> list[ContactTerm]:
+        """Contacts with obstacles."""
+        return [term for term in self.problem.terms if isinstance(term, ContactTerm)]
 
     @property
     def state(self) -> State:
@@ -83,7 +103,7 @@ class Model:
     def reaction(self, name: str) -> np.ndarray:
         """Sum (3,) over a named edge set's vertices of the forces that the supports exert."""
         forces = self.x.duplicate()
-        self.problem.forces(self.x, forces)
+        (self.balance or self.problem).forces(self.x, forces)
         dofs = place_nodes(self.configuration, name).dofs
         owned = [self.configuration.owned_dofs(column) for column in dofs.T]
         return self.configuration.sum([forces.array_r[part].sum() for part in owned])

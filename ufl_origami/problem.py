@@ -1,6 +1,7 @@
 """Sum of terms under constraints: potential energy, residual and tangent of one scene."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -10,7 +11,7 @@ import numpy as np
 from ufl_origami.assembly import Tangent
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.constraints import Constraints
-from ufl_origami.terms.base import Term
+from ufl_origami.terms.base import Rates, Term
 
 
 class Problem:
@@ -32,10 +33,19 @@ class Problem:
         self.configuration = configuration
         self.terms = list(terms)
         self.constraints = constraints
-        self.tangent = Tangent(configuration, self.terms)
         self.time = 0.0
         self.force_scale = 0.0
         self._part = configuration.create_vector()
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The matrix, made when it is first needed."""
+        return Tangent(self.configuration, self.terms)
+
+    @property
+    def bounded(self) -> bool:
+        """Whether a term's energy ends somewhere."""
+        return any(term.bounded for term in self.terms)
 
     @property
     def symmetric(self) -> bool:
@@ -60,9 +70,25 @@ class Problem:
     def energies(self, vector: PETSc.Vec) -> dict[str, float]:
         """Energy by kind, summed over ranks."""
         state = self.state(vector)
+        return self._by_kind({term: term.energies(state) for term in self.terms})
+
+    def slopes(self, vector: PETSc.Vec, step: PETSc.Vec) -> dict[str, float]:
+        """Derivatives of the energies along a step, by kind; see `Term.slope`."""
+        state, local = self.state(vector), self.configuration.to_local(step)
+        terms = [term for term in self.terms if term.conservative]
+        return self._by_kind({term: term.slope(state, local) for term in terms})
+
+    def work(self, vector: PETSc.Vec, step: PETSc.Vec) -> float:
+        """Work of the forces without energy, as they are at a vector of unknowns, over a step."""
+        state, local = self.state(vector), self.configuration.to_local(step)
+        parts = [term.slope(state, local).sum() for term in self.terms if not term.conservative]
+        return -float(self.configuration.sum(sum(parts)))
+
+    def _by_kind(self, values: Mapping[Term, np.ndarray]) -> dict[str, float]:
+        """Values of terms, one for each of their kinds, summed by kind and over ranks."""
         local: dict[str, float] = {}
-        for term in self.terms:
-            for kind, value in zip(term.kinds, term.energies(state), strict=True):
+        for term, parts in values.items():
+            for kind, value in zip(term.kinds, parts, strict=True):
                 local[kind] = local.get(kind, 0.0) + value
         total = self.configuration.sum(list(local.values()))
         return dict(zip(local, map(float, total), strict=True))
@@ -128,6 +154,29 @@ class Problem:
         step = self.configuration.to_local(trial) - state.q
         largest = max((term.largest_turn(state, step) for term in self.terms), default=0.0)
         return self.configuration.comm.allreduce(largest, op=MPI.MAX)
+
+    def begin_step(self, rates: Rates) -> None:
+        """Hand the rates of a time step to the terms."""
+        for term in self.terms:
+            term.begin_step(rates)
+
+    def longest_step(self, vector: PETSc.Vec, step: PETSc.Vec, since: float | None = None) -> float:
+        """Largest part, at most 1, of a step on which all energies stay defined; collective.
+
+        Args:
+            vector: where the step starts.
+            step: increments.
+            since: time at its start, default the problem's: what moves in time moves as well.
+        """
+        state = self.configuration.state(vector, self.time if since is None else since)
+        local = self.configuration.to_local(step)
+        parts = [term.longest_step(state, local) for term in self.terms if term.bounded]
+        return self.configuration.comm.allreduce(min(parts, default=1.0), op=MPI.MIN)
+
+    def objection(self, vector: PETSc.Vec) -> str:
+        """Why a term refuses a converged state, or an empty string; collective."""
+        state = self.state(vector)
+        return next(filter(None, [term.objection(state) for term in self.terms]), "")
 
     def accept(self, vector: PETSc.Vec) -> None:
         """Adopt a converged state (branches of the angles)."""

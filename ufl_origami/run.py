@@ -1,42 +1,27 @@
-"""One call that follows a scene's static path and keeps what it finds.
+"""One call that follows a scene's static path and keeps what it finds (see recording.py)."""
 
-In the output folder:
-
-* history.csv: one row an accepted step (see history.py);
-* fields.*: the state at the start and after each accepted step (see output.py); a resumed run
-  writes fields_from_STEP.* beside them;
-* checkpoint/: the last accepted step (see checkpoint.py).
-"""
-
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from petsc4py import PETSc
 
-from tqdm import tqdm
-
-from ufl_origami.checkpoint import Checkpoint, Progress
-from ufl_origami.collective import on_rank0
+from ufl_origami.checkpoint import Memory
 from ufl_origami.discretise import build
-from ufl_origami.errors import InputError, SolveError
-from ufl_origami.history import CsvFile, History, Record, Recorder, Row, read_history, step_row
+from ufl_origami.errors import InputError
+from ufl_origami.history import History, Record, Row, energy_columns, step_row
 from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model
-from ufl_origami.output import FieldWriter
 from ufl_origami.quality import warn_sagitta
+from ufl_origami.recording import Disk, Log, ProgressBar
 from ufl_origami.resolution import warn_round_off
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.newton import SHIFT_FACTOR, NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, Step, StepSettings
 from ufl_origami.supports import check_supports
-
-HISTORY_FILE = "history.csv"
-CHECKPOINT_FOLDER = "checkpoint"
-COLLECTIVE_ERRORS = (SolveError, InputError, KeyboardInterrupt, OSError)
+from ufl_origami.terms.base import Term
 
 
 @dataclass(frozen=True)
@@ -104,21 +89,26 @@ def solve_static(
     model = scene if isinstance(scene, Model) else build(scene)
     if not model.scene.terms:  # a term of the user's own may hold the sheet as well
         check_supports(model)
+    model.load_factor.held = model.motion = model.balance = None
+    for term in model.contacts:
+        term.check(model.state)
     solver = NewtonSolver(model.problem, newton or NewtonSettings())
     path = StaticPath(model.problem, solver, steps or StepSettings(), Admissible(model))
-    log = _Log(model, record or Record())
+    record = record or Record()
+    log = Log(model, record, _StaticRun(path, model, record))
     with ExitStack() as stack:
-        observers = [log.observe]
+        disk = None
         if output is not None:
-            disk = stack.enter_context(_Disk(path, log, Path(output)))
+            disk = stack.enter_context(Disk(log, Path(output)))
             disk.resume() if resume else disk.begin()
-            observers.append(disk.observe)
-        bar = stack.enter_context(closing(_ProgressBar(model, stops, progress)))
+        bar = stack.enter_context(closing(ProgressBar(model, stops, progress, "load factor")))
         request = stack.enter_context(InterruptRequest())
 
         def accept(step: Step, x: PETSc.Vec) -> None:
-            for observe in [*observers, bar.observe]:
-                observe(step)
+            log.observe()
+            if disk:
+                disk.observe()
+            bar.observe(step)
             if on_accept:
                 on_accept(step, model)
             if request.agreed(model.sheet.comm):
@@ -130,86 +120,35 @@ def solve_static(
     return StaticResult(model, path.steps, log.history)
 
 
-class _Log:
-    """History in memory, the same on all ranks."""
+@dataclass(frozen=True)
+class _StaticRun:
+    """A static path as it is recorded."""
 
-    def __init__(self, model: Model, record: Record):
-        self.model, self.record, self.history = model, record, History()
-        self._recorder = Recorder(model, record)
+    path: StaticPath
+    model: Model
+    record: Record
 
-    def row(self, step: Step) -> Row:
-        """Columns of a step, whose state the model is in; collective."""
-        return step_row(step) | self._recorder.measure()
+    @property
+    def rows(self) -> int:
+        """One a step."""
+        return len(self.path.steps)
 
-    def observe(self, step: Step) -> None:
-        """Add the step's row, that of rank 0 (whose clock counts)."""
-        self.history.rows.append(self.model.sheet.comm.bcast(self.row(step), root=0))
+    @property
+    def terms(self) -> Sequence[Term]:
+        """All terms of the model."""
+        return self.model.problem.terms
 
+    def columns(self) -> Row:
+        """Columns of the last step, and energies."""
+        energies = energy_columns(self.model.energies()) if self.record.energies else {}
+        return step_row(self.path.steps[-1]) | energies
 
-class _Disk:
-    """History file, fields and checkpoint of one run, written in this order at each step.
+    def vectors(self) -> dict[str, PETSc.Vec]:
+        """None."""
+        return {}
 
-    A run killed in between has rows and fields beyond its checkpoint; resuming drops such rows.
-    """
-
-    def __init__(self, path: StaticPath, log: _Log, folder: Path):
-        self.path, self.log, self.folder = path, log, folder
-        self.comm = log.model.sheet.comm
-        self._checkpoint = Checkpoint(log.model, folder / CHECKPOINT_FOLDER)
-        self._csv: CsvFile | None = None
-        self._fields: FieldWriter | None = None
-
-    def begin(self) -> None:
-        """Start afresh: an earlier run's history, fields and checkpoint are replaced."""
-        self._checkpoint.clear()
-        self._open("fields")
-        if self._fields:
-            self._fields.write()
-        self._save()
-
-    def resume(self) -> None:
-        """Take up model, solver, steps and history where the checkpoint left them.
-
-        Raises:
-            InputError: no checkpoint of this scene, or a history that does not fit it.
-        """
-        progress = self._checkpoint.read()
-        self.path.steps[:] = progress.steps
-        self.path.size, self.path.newton.shift = progress.size, progress.shift
-        count = len(progress.steps)
-        file = self.folder / HISTORY_FILE
-        rows = on_rank0(self.comm, lambda: read_history(file, count).rows if count else [])
-        self.log.history.rows[:] = self.comm.bcast(rows, root=0)
-        self._require_history(progress.steps)
-        self._open(f"fields_from_{count}")
-
-    def _require_history(self, steps: list[Step]) -> None:
-        history, file = self.log.history, self.folder / HISTORY_FILE
-        if len(history) != len(steps):
-            raise InputError(f"{file} has {len(history)} of the checkpoint's {len(steps)} steps")
-        columns = tuple(self.log.row(steps[-1])) if steps else ()
-        if columns != history.columns:
-            other = sorted(set(columns) ^ set(history.columns))
-            raise InputError(f"{file} was recorded with other columns: {other}")
-
-    def _open(self, fields: str) -> None:
-        """Open history and fields."""
-        file = self.folder / HISTORY_FILE
-        self._csv = on_rank0(self.comm, lambda: CsvFile(file, self.log.history.rows))
-        if self.log.record.fields != "none":
-            path = self.folder / fields
-            self._fields = FieldWriter(self.log.model, path, self.log.record.fields)
-
-    def observe(self, step: Step) -> None:
-        """Write the state of an accepted step."""
-        file, row = self._csv, self.log.history.rows[-1]
-        on_rank0(self.comm, lambda: file.write(row) if file else None)
-        if self._fields:
-            self._fields.write()
-        self._save()
-
-    def _save(self) -> None:
-        """Checkpoint, with the solver's memory as the first factorisation will need it.
+    def memory(self) -> Memory:
+        """Steps and sizes, with the solver's memory as the first factorisation will need it.
 
         A continued run factors the tangent of its first state once more. Where that needed a
         shift, the guard has to find the same one at its first try.
@@ -217,45 +156,9 @@ class _Disk:
         steps, shift = self.path.steps, self.path.newton.shift
         if steps and steps[-1].negative_pivots:
             shift *= SHIFT_FACTOR
-        time = self.log.model.problem.time
-        self._checkpoint.write(Progress(time, steps, self.path.size, shift))
+        return {"steps": list(map(asdict, steps)), "size": self.path.size, "shift": shift}
 
-    def __enter__(self) -> "_Disk":
-        """Files are opened by `begin` or `resume`."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Close the files.
-
-        Fields are closed by all ranks together: not after an error that one rank may have alone,
-        which waiting for the others would hide.
-        """
-        if self._csv:
-            self._csv.close()
-        together = kind is None or issubclass(kind, COLLECTIVE_ERRORS) or self.comm.size == 1
-        if self._fields and together:
-            self._fields.close()
-
-
-class _ProgressBar:
-    """Load factor, step, Newton iterations and step size on the error stream of rank 0."""
-
-    def __init__(self, model: Model, stops: Sequence[float], shown: bool | None):
-        start, self._bar = model.problem.time, None
-        if model.sheet.comm.rank == 0 and (sys.stderr.isatty() if shown is None else shown):
-            self._bar = tqdm(
-                total=max([start, *stops]), initial=start, desc="load factor",
-                bar_format="{desc} {n:.4g}/{total:.4g} |{bar}| {elapsed}{postfix}",
-            )  # fmt: skip
-
-    def observe(self, step: Step) -> None:
-        """Show an accepted step."""
-        if self._bar is not None:
-            values = {"step": step.number, "newton": step.iterations, "size": f"{step.size:.3g}"}
-            self._bar.set_postfix(values, refresh=False)
-            self._bar.update(step.time - self._bar.n)
-
-    def close(self) -> None:
-        """Leave the last line standing."""
-        if self._bar is not None:
-            self._bar.close()
+    def recall(self, memory: Memory, vectors: dict[str, PETSc.Vec]) -> None:
+        """Take up solver and steps."""
+        self.path.steps[:] = [Step(**step) for step in memory["steps"]]
+        self.path.size, self.path.newton.shift = memory["size"], memory["shift"]

@@ -19,14 +19,14 @@ from ufl_origami.scene_parts import (
     ClampSpec,
     CreaseSpec,
     Displacement,
+    LoadFactor,
     LoadSpec,
     MotionSpec,
     Pair,
     Scalar,
     Vector,
-    scalar_function,
-    vector_function,
 )
+from ufl_origami.scene_surroundings import Surroundings
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.stencils import BENDING_FORMS
 from ufl_origami.terms.base import Term
@@ -42,7 +42,7 @@ TermMaker = Callable[[Configuration, SheetFunctions], Term]
 
 
 @dataclass
-class Scene:
+class Scene(Surroundings):
     """Declaration of a simulation.
 
     Args:
@@ -105,7 +105,8 @@ class Scene:
         """Return the same scene for another model, with that model's default choices."""
         copies = {p.name: list(getattr(self, p.name)) for p in fields(self) if _is_list(p)}
         kept: dict[str, Any] = {"sheet": self.sheet, "material": self.material, **copies}
-        return Scene(model=model, curvatures=dict(self.curvatures), **kept)
+        kept |= {"curvatures": dict(self.curvatures), "magnets": dict(self.magnets)}
+        return Scene(model=model, **kept)
 
     def panel_material(self, panel: str) -> Material:
         """Material of a panel."""
@@ -212,27 +213,27 @@ class Scene:
     def point_load(self, name: str, force: Vector) -> None:
         """Dead force (3,) on a named point."""
         self.sheet.point_vertex(name)
-        self._load("point", name, vector_function(force, f"point load {name!r}"))
+        self._load("point", name, force)
 
     def line_load(self, name: str, force: Vector) -> None:
         """Dead force per rest length (3,) on a named edge set."""
         self.sheet.edge_facets(name)
-        self._load("line", name, vector_function(force, f"line load {name!r}"))
+        self._load("line", name, force)
 
     def area_load(self, name: str, force: Vector) -> None:
         """Dead force per rest area (3,) on a named panel."""
         self.sheet.panel_cells(name)
-        self._load("area", name, vector_function(force, f"area load {name!r}"))
+        self._load("area", name, force)
 
     def pressure(self, name: str, pressure: Scalar) -> None:
         """Follower pressure on a named panel, positive along its normal."""
         self.sheet.panel_cells(name)
-        self._load("pressure", name, scalar_function(pressure, f"pressure {name!r}"))
+        self._load("pressure", name, pressure)
 
     def edge_moment(self, name: str, moment: Scalar) -> None:
         """Moment per rest length on a boundary, lifting its outward tangent to the normal."""
         self.sheet.edge_facets(name)
-        self._load("moment", name, scalar_function(moment, f"edge moment {name!r}"))
+        self._load("moment", name, moment)
 
     def natural_curvature(self, name: str, tensor: np.ndarray) -> None:
         """Stress-free curvature of a panel, added to its rest shape.
@@ -265,19 +266,10 @@ class Scene:
             raise SceneError(f"add_term: expected a function that makes a term, got {maker!r}")
         self.terms.append(maker)
 
-    def _load(self, kind: str, name: str, value: Callable) -> None:
-        self.loads.append(LoadSpec(kind, name, value))
-
-    def _require_place(self, name: str) -> None:
-        sheet = self.sheet
-        kinds = {"point": sheet.points, "panel": sheet.panel_names, "edge set": sheet.edges}
-        found = [kind for kind, names in kinds.items() if name in names]
-        if len(found) > 1:
-            raise SceneError(
-                f"{name!r} names several places ({', '.join(found)}): rename all but one"
-            )
-        if name not in self.sheet.points and name not in self.sheet.panel_names:
-            self.sheet.edge_facets(name)
+    def _load(self, kind: str, name: str, value: Scalar | Vector) -> None:
+        spec = LoadSpec(kind, name, value)
+        spec.function(LoadFactor())  # refuse a wrong value where it is declared
+        self.loads.append(spec)
 
 
 def _is_list(part: Field) -> bool:

@@ -1,13 +1,15 @@
 """What a scene consists of: named declarations and the values that they take.
 
-Values: a number or vector is proportional to the load factor (or time); a function of time is
-taken as it is. Displacement components may also be functions f(time, rest) of the rest
+Values: a number or vector is multiplied by the load factor; a function of time is taken as it is.
+In statics time is the load factor; while real time runs the load factor is held (1 in a run that
+starts at rest). Displacement components may also be functions f(time, rest) of the rest
 coordinates (n, 3) of the nodes.
 """
 
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +23,23 @@ Vector = Sequence[float] | Callable[[float], np.ndarray]
 Pair = tuple[str, str]
 
 
-def scalar_function(value: Scalar, label: str) -> TimeFunction:
-    """Function of time from a number (proportional to time) or a function.
+@dataclass
+class LoadFactor:
+    """Factor of all numbers that a scene declares, as a function of time.
+
+    Attributes:
+        held: the factor while real time runs; None: time is the load factor.
+    """
+
+    held: float | None = None
+
+    def __call__(self, time: float) -> float:
+        """Factor at a time."""
+        return time if self.held is None else self.held
+
+
+def scalar_function(value: Scalar, label: str, factor: LoadFactor) -> TimeFunction:
+    """Function of time from a number (times the load factor) or a function.
 
     Raises:
         SceneError: the number is not finite.
@@ -31,11 +48,11 @@ def scalar_function(value: Scalar, label: str) -> TimeFunction:
         return value
     if not np.isfinite(value):
         raise SceneError(f"{label}: value {value} is not finite")
-    return lambda time: value * time
+    return lambda time: value * factor(time)
 
 
-def vector_function(value: Vector, label: str) -> Callable[[float], np.ndarray]:
-    """Function of time from a vector (proportional to time) or a function.
+def vector_function(value: Vector, label: str, factor: LoadFactor) -> Callable[[float], np.ndarray]:
+    """Function of time from a vector (times the load factor) or a function.
 
     Raises:
         SceneError: not three finite numbers; for a function, when it is called.
@@ -51,7 +68,7 @@ def vector_function(value: Vector, label: str) -> Callable[[float], np.ndarray]:
         function: Callable[[float], np.ndarray] = value
         return lambda time: checked(function(time))
     vector = checked(value)
-    return lambda time: vector * time
+    return lambda time: vector * factor(time)
 
 
 @dataclass(frozen=True)
@@ -99,20 +116,36 @@ class LoadSpec:
 
     kind: str
     name: str
-    value: Callable
+    value: Scalar | Vector
+
+    @property
+    def label(self) -> str:
+        """How messages call it."""
+        return f"{'edge moment' if self.kind == 'moment' else self.kind + ' load'} {self.name!r}"
+
+    def function(self, factor: LoadFactor) -> Callable:
+        """Its value as a function of time.
+
+        Raises:
+            SceneError: a number that is not finite, a vector that is not three finite numbers.
+        """
+        value: Any = self.value
+        if self.kind in ("pressure", "moment"):
+            return scalar_function(value, self.label, factor)
+        return vector_function(value, self.label, factor)
 
 
-def displacement_function(value: Displacement, rest: np.ndarray, label: str):
+def displacement_function(value: Displacement, rest: np.ndarray, label: str, factor: LoadFactor):
     """Function of time giving displacements (n,) of vertices with rest coordinates (n, 3)."""
     if not callable(value):
-        return scalar_function(value, label)
+        return scalar_function(value, label, factor)
     function: Callable[..., np.ndarray | float] = value
-    if _required_arguments(function) > 1:
+    if required_arguments(function) > 1:
         return lambda time: function(time, rest)
     return function
 
 
-def _required_arguments(function: Callable) -> int:
+def required_arguments(function: Callable) -> int:
     """Number of positional arguments without default; 1 where Python cannot tell (builtins)."""
     try:
         parameters = inspect.signature(function).parameters.values()

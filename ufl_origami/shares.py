@@ -4,13 +4,16 @@ Displacements go by input vertex, edge unknowns by the pair of input vertices, a
 remembers (branches of angles) by the term's own keys.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from petsc4py import PETSc
 
 import numpy as np
 
 from ufl_origami.identity import edge_keys
 from ufl_origami.model import Model
-from ufl_origami.terms.base import Keyed
+from ufl_origami.terms.base import Keyed, Term
 
 
 @dataclass(frozen=True)
@@ -26,10 +29,11 @@ class Shares:
 
     Args:
         model: the model.
+        terms: terms whose memories belong to the state.
     """
 
-    def __init__(self, model: Model):
-        self.model = model
+    def __init__(self, model: Model, terms: Sequence[Term]):
+        self.model, self.terms = model, list(terms)
         configuration, sheet = model.configuration, model.sheet
         self._num_positions = 3 * configuration.nv_owned
         self._vertex_keys = sheet.input_vertex[: configuration.nv_owned].astype(np.int64)
@@ -40,24 +44,31 @@ class Shares:
             positions = self._num_positions + slot[facets]
             self._edges[name] = _EdgeShare(positions, edge_keys(sheet, facets))
 
-    def get(self) -> dict[str, Keyed]:
+    def get(self, vectors: Mapping[str, PETSc.Vec]) -> dict[str, Keyed]:
         """Copies of the current values by label."""
-        owned = self.model.x.array_r
-        displacement = owned[: self._num_positions].reshape(-1, 3).copy()
-        shares = {"displacement": Keyed(self._vertex_keys, displacement)}
-        for name, share in self._edges.items():
-            shares[f"edge.{name}"] = Keyed(share.keys, owned[share.positions])
-        for i, term in enumerate(self.model.problem.terms):
+        shares: dict[str, Keyed] = {}
+        for prefix, vector in self._all(vectors).items():
+            owned = vector.array_r
+            displacement = owned[: self._num_positions].reshape(-1, 3).copy()
+            shares[f"{prefix}displacement"] = Keyed(self._vertex_keys, displacement)
+            for name, share in self._edges.items():
+                shares[f"{prefix}edge.{name}"] = Keyed(share.keys, owned[share.positions])
+        for i, term in enumerate(self.terms):
             shares |= {f"term{i}.{name}": share for name, share in term.history().items()}
         return shares
 
-    def set(self, values: dict[str, np.ndarray]) -> None:
+    def _all(self, vectors: Mapping[str, PETSc.Vec]) -> dict[str, PETSc.Vec]:
+        """The model's unknowns and further vectors, by the prefix of their labels."""
+        return {"": self.model.x} | {f"{name}.": vector for name, vector in vectors.items()}
+
+    def set(self, values: dict[str, np.ndarray], vectors: Mapping[str, PETSc.Vec]) -> None:
         """Set the state from values by label, in the order of the keys of `get`."""
-        owned = self.model.x.array_w
-        owned[: self._num_positions] = values["displacement"].ravel()
-        for name, share in self._edges.items():
-            owned[share.positions] = values[f"edge.{name}"]
-        for i, term in enumerate(self.model.problem.terms):
+        for prefix, vector in self._all(vectors).items():
+            owned = vector.array_w
+            owned[: self._num_positions] = values[f"{prefix}displacement"].ravel()
+            for name, share in self._edges.items():
+                owned[share.positions] = values[f"{prefix}edge.{name}"]
+        for i, term in enumerate(self.terms):
             term.restore({name: values[f"term{i}.{name}"] for name in term.history()})
 
 

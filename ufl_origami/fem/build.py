@@ -21,10 +21,12 @@ from ufl_origami.model import CreaseModel, Model
 from ufl_origami.problem import Problem
 from ufl_origami.quality import warn_mesh
 from ufl_origami.scene import Scene
-from ufl_origami.scene_parts import LoadSpec
+from ufl_origami.scene_parts import LoadFactor
 from ufl_origami.sides import edge_fan, edge_sides
+from ufl_origami.surroundings import surrounding_terms
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.form import SheetFunctions
+from ufl_origami.terms.loads import Amplitude
 
 
 def build_fem(scene: Scene) -> Model:
@@ -57,22 +59,25 @@ def build_fem(scene: Scene) -> Model:
     def nodes(state: State) -> np.ndarray:
         return rest + state.q[dofs]
 
-    def moment(spec: LoadSpec) -> Term:
-        loaded = moment_sides(scene, sides, spec.name)
-        return FemEdgeMoment(configuration, shell, loaded, spec.value)
+    def moment(name: str, value: Amplitude) -> Term:
+        loaded = moment_sides(scene, sides, name)
+        return FemEdgeMoment(configuration, shell, loaded, value)
 
-    functions = SheetFunctions.create(configuration)
+    functions, factor = SheetFunctions.create(configuration), LoadFactor()
     springs = fem_springs(scene, configuration, fans, angles, nodes)
     terms: list[Term] = [shell]
     terms += [FoldTerm(configuration, spring) for spring in springs if not spring.spec.stiff]
-    terms += load_terms(scene, configuration, functions, moment)
-    terms += [maker(configuration, functions) for maker in scene.terms]
-    constraints = make_constraints(scene, configuration)
+    terms += load_terms(scene, configuration, functions, factor, moment)
+    around, in_time = surrounding_terms(scene, configuration, functions, factor)
+    terms += around + [maker(configuration, functions) for maker in scene.terms]
+    constraints = make_constraints(scene, configuration, factor)
     hold_stiff_folds(springs, constraints)
     problem = Problem(configuration, terms, constraints)
     problem.set_time(0.0)
     creases: dict[str, CreaseModel] = {s.spec.name: s.crease for s in reversed(springs)}
-    return Model(sheet, configuration, problem, shell, creases, x, scene)
+    return Model(
+        sheet, configuration, problem, shell, creases, x, scene, factor, functions, in_time
+    )
 
 
 def rest_vector(configuration: Configuration, fans, rest_angles):

@@ -56,7 +56,7 @@ class Admissible:
             return f"a triangle shrank to {area:.3g} of its area"
         if not turn < self.limits.turn:
             return f"a fold angle turned by {np.degrees(turn):.1f} deg in one step"
-        return ""
+        return self.model.problem.objection(trial)
 
 
 def largest_turn(model: Model, trial: PETSc.Vec) -> float:

@@ -101,12 +101,14 @@ class NewtonSolver:
         shift: last diagonal shift over the weights, 0 before the first one.
         report: what the solve under way did so far.
         allowed: negative pivots that the guard leaves alone (to follow an unstable branch).
+        pivots: negative pivots of the last tangent, None where unknown.
     """
 
     def __init__(self, problem: Problem, settings: NewtonSettings | None = None):
         self.problem, self.settings = problem, settings or NewtonSettings()
         self.report = NewtonReport()
         self.allowed = 0
+        self.pivots: int | None = None
         self._residual_vector = problem.configuration.create_vector()
         self._previous: PETSc.Vec | None = None
         self._mip = self._guard = self.settings.method == "default"
@@ -126,6 +128,8 @@ class NewtonSolver:
         snes.setFunction(self._function, self._residual_vector.duplicate())
         snes.setJacobian(self._jacobian, matrix, matrix)
         snes.setConvergenceTest(self._converged)
+        if self.problem.bounded:
+            snes.setLineSearchPreCheck(self._stop_before_bounds)
         if self.problem.conservative and line_search == "bt":
             snes.setObjective(lambda _, x: self.problem.potential(x))
         with self._scope({"snes_linesearch_type": line_search}):
@@ -148,6 +152,15 @@ class NewtonSolver:
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
         self.problem.residual(x, out)
 
+    def _stop_before_bounds(self, x: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Shorten a Newton step (SNES goes to x - step) that a barrier would not survive."""
+        ahead = step.copy()
+        ahead.scale(-1.0)
+        part = self.problem.longest_step(x, ahead)
+        if part < 1.0:
+            step.scale(part)
+        return part < 1.0
+
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix, _) -> None:
         """Tangent at an iterate, factored and shifted where the guard asks for it."""
         self.problem.linearise(self._previous if self._mip else None, x)
@@ -155,7 +168,7 @@ class NewtonSolver:
         self._floor = min(self._floor or np.inf, self._round_off(x))
         self.problem.constrain(matrix, None, None)
         early = self._mip and snes.getIterationNumber() < self._patience
-        found = self.factor(snes.getKSP(), shift=not early)
+        found = self.pivots = self.factor(snes.getKSP(), shift=not early)
         self._excess = self._guard and (found or 0) > self.allowed
         self._unguarded |= early and self._excess
         if self._previous is None:
@@ -169,6 +182,10 @@ class NewtonSolver:
         has no bound.
         """
         self._floor = self._round_off(x)
+
+    def forget_floor(self) -> None:
+        """Take the tolerance floor from the first tangent of the next solve."""
+        self._floor = 0.0
 
     def _round_off(self, x: PETSc.Vec) -> float:
         """Tolerance that the residual's round-off allows: its norm grows with the unknowns."""

@@ -21,6 +21,7 @@ import numpy as np
 
 from ufl_origami.errors import BranchWarning, InputError, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
+from ufl_origami.solvers.clearance import clear_start
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
 
 log = logging.getLogger(__name__)
@@ -233,7 +234,11 @@ class StaticPath:
     ) -> tuple[PETSc.Vec, NewtonReport]:
         """Predictor and Newton from an accepted state whose tangent is factored."""
         self.newton.report = NewtonReport(iterations=1)
-        trial = self._predict(x, target)
+        step = self._predict(x, target)
+        trial, blocked = clear_start(self.problem, x, step, time)
+        if blocked:
+            self.newton.report.reason = blocked
+            return trial, self.newton.report
         predicted = trial.copy()
         turn = self.problem.largest_turn(x, trial)
         if turn >= self.settings.turn:
@@ -254,7 +259,7 @@ class StaticPath:
         return float(np.sqrt(moved / size))
 
     def _predict(self, x: PETSc.Vec, target: float) -> PETSc.Vec:
-        """Linear solution of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
+        """Increments du of the step: K_ff du_f = -f - K_fc du_c with the factored tangent."""
         problem = self.problem
         matrix = problem.tangent.insert(problem.state(x))
         problem.constraints.check(target)
@@ -269,6 +274,4 @@ class StaticPath:
         problem.constrain(matrix, known, rhs)
         step = x.duplicate()
         self.newton.linear.solve(rhs, step)
-        step.axpy(1.0, x)
-        step.array_w[dofs] = values  # to the last digit: the residual's norm mixes units
         return step

@@ -6,6 +6,7 @@ energy is one subclass in this folder: `FormTerm` (see form.py) where UFL can sa
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,35 @@ class Keyed:
     values: np.ndarray
 
 
+@dataclass(frozen=True)
+class Rates:
+    """How rates follow from the unknowns q at the end of the time step under way.
+
+    Velocity rate (q - base), acceleration inertia (q - target); base is a sum of earlier states.
+
+    Attributes:
+        rate: factor of the velocities (1 / time).
+        inertia: factor of the accelerations (1 / time^2).
+        weights: factors, summing to 1, of the last accepted states in base, latest first.
+        times: times of these states.
+        last: unknowns (num_local,) of the last accepted state.
+        base: (num_local,).
+        target: (num_local,).
+    """
+
+    rate: float
+    inertia: float
+    weights: tuple[float, ...]
+    times: tuple[float, ...]
+    last: np.ndarray
+    base: np.ndarray
+    target: np.ndarray
+
+    def velocity(self, q: np.ndarray) -> np.ndarray:
+        """Velocities (num_local,) at unknowns (num_local,)."""
+        return self.rate * (q - self.base)
+
+
 class Term(ABC):
     """One contribution to the potential energy.
 
@@ -33,11 +63,13 @@ class Term(ABC):
         kinds: names under which its energies are booked ("membrane", "crease", "load", ...).
         conservative: False where no energy exists (follower loads, friction).
         symmetric: whether the tangent is symmetric.
+        bounded: whether its energy ends somewhere (barriers), so that steps must stop before.
     """
 
     kinds: tuple[str, ...] = ()
     conservative: bool = True
     symmetric: bool = True
+    bounded: bool = False
 
     @abstractmethod
     def energies(self, state: State) -> np.ndarray:
@@ -58,6 +90,43 @@ class Term(ABC):
             current: the iterate at which the tangent will be formed.
         """
 
+    def begin_step(self, rates: Rates) -> None:
+        """Take over the rates of a time step that begins; statics has none."""
+
+    def slope(self, state: State, step: np.ndarray) -> np.ndarray:
+        """Derivatives (len(kinds),) of this rank's energies along a step from a state.
+
+        They come from the energies alone, so that a force that is not the gradient of its energy
+        shows in the energy book. A term without energy gives minus the work of its force.
+
+        Args:
+            state: where the derivative is taken.
+            step: direction (num_local,).
+        """
+        if not self.conservative:
+            out = np.zeros(len(step))
+            self.add_residual(state, out)
+            return np.array([out @ step])
+        return central_slope(lambda part: self.energies(state.moved(part * step)))
+
+    def drive(self, state: State, since: float) -> float:
+        """Work done on the sheet by bodies that moved since a time, through this rank's force.
+
+        It is no part of what the force takes from the sheet and turns into heat.
+        """
+        return 0.0
+
+    def longest_step(self, state: State, step: np.ndarray) -> float:
+        """Part, at most 1, of a step that keeps this rank's energy well defined all the way.
+
+        A tenth of the distance to where it ends is left.
+        """
+        return 1.0
+
+    def objection(self, state: State) -> str:
+        """Why a converged state must not be accepted, or an empty string; collective."""
+        return ""
+
     def largest_turn(self, state: State, step: np.ndarray) -> float:
         """Largest change (radians) to first order of this rank's unwrapped angles over a step.
 
@@ -76,6 +145,16 @@ class Term(ABC):
 
     def restore(self, values: dict[str, np.ndarray]) -> None:
         """Take back the values of `history`, in the order of the keys that it gives now."""
+
+
+def central_slope(function: Callable[[float], np.ndarray], width: float = 1 / 16) -> np.ndarray:
+    """Derivative at 0 by central differences of order six, exact for polynomials of degree six.
+
+    The energies of straight triangles are quartic along a step but for their angles.
+    """
+    weights = {1: 0.75, 2: -0.15, 3: 1 / 60}
+    parts = [w * (function(k * width) - function(-k * width)) for k, w in weights.items()]
+    return np.sum(parts, axis=0) / width
 
 
 class StencilTerm(Term):

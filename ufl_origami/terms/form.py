@@ -1,6 +1,8 @@
 """Terms written in UFL: any functional of the displacement over the sheet's mesh."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from petsc4py import PETSc
 
@@ -15,6 +17,9 @@ from ufl_origami.sheet import SheetMesh
 from ufl_origami.terms.base import MatrixTerm
 
 JIT_OPTIONS = {"timeout": 300}
+
+MIDPOINT_WEIGHTS = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]) / 24
+"""Weights of corners and midpoints on the reference triangle: the corner rule on its four parts."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +66,54 @@ class SheetFunctions:
         self.time.value = state.time
 
     def piecewise(self, values: np.ndarray) -> fem.Function:
-        """Function that is constant on each triangle, from local values (nc,)."""
-        function = fem.Function(fem.functionspace(self.sheet.mesh, ("DG", 0)))
-        function.x.array[:] = values
+        """Function that is constant on each triangle, from local values (nc,) or (nc, 3)."""
+        values = np.asarray(values, dtype=float)
+        function = fem.Function(fem.functionspace(self.sheet.mesh, ("DG", 0, values.shape[1:])))
+        function.x.array[:] = values.ravel()
         return function
+
+    def number(self, value: float | Sequence[float] | np.ndarray) -> fem.Constant:
+        """Constant number or vector that no form is compiled anew for."""
+        return fem.Constant(self.sheet.mesh, np.asarray(value, dtype=float))
+
+    @property
+    def second_order(self) -> bool:
+        """Whether the edges' midpoints move on their own."""
+        return self.V.element.basix_element.degree > 1
+
+    def field(self) -> fem.Function:
+        """Fresh function in the displacement's space."""
+        return fem.Function(self.V)
+
+    def nodal(self) -> ufl.Measure:
+        """Integral over the rest area by its values at the nodes that move.
+
+        Those are the corners of the triangles, or of the four parts into which midpoints cut each.
+        """
+        if not self.second_order:
+            return ufl.dx(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+        rule = {"quadrature_points": self.node_points(), "quadrature_weights": MIDPOINT_WEIGHTS}
+        return ufl.dx(metadata={"quadrature_rule": "custom", "quadrature_degree": 1, **rule})
+
+    def node_points(self) -> np.ndarray:
+        """Nodes (k, 2) of the reference triangle: corners, then midpoints where they move."""
+        return self.V.element.basix_element.points
 
 
 def deformed_jacobian(u: fem.Function) -> tuple:
     """Reference and current covariant bases as columns, (3, 2) each: J and J + grad(u) J."""
     jacobian = ufl.Jacobian(extract_unique_domain(u))
     return jacobian, jacobian + ufl.dot(ufl.grad(u), jacobian)
+
+
+def pushed_forward(u: fem.Function, vector):
+    """Vector of the rest state in the triangles' planes, carried along by the deformation.
+
+    F v with F = j (J^T J)^-1 J^T; what of v is normal to a triangle is lost.
+    """
+    jacobian, current = deformed_jacobian(u)
+    metric = ufl.dot(jacobian.T, jacobian)
+    return ufl.dot(current, ufl.dot(ufl.inv(metric), ufl.dot(jacobian.T, vector)))
 
 
 class FormTerm(MatrixTerm):
@@ -94,6 +137,7 @@ class FormTerm(MatrixTerm):
         self.conservative = self.symmetric = energy is not None
         self.functions = functions
         residual = force if energy is None else ufl.derivative(energy, functions.u)
+        self._given = energy, force
         self._energy = None if energy is None else self._compile(energy)
         self._residual = self._compile(residual)
         tangent = ufl.algorithms.expand_derivatives(ufl.derivative(residual, functions.u))
@@ -109,6 +153,22 @@ class FormTerm(MatrixTerm):
             return np.zeros(1)
         self.functions.set(state)
         return np.array([compat.assemble_scalar(self._energy)])
+
+    @cached_property
+    def _along(self) -> tuple[fem.Function, fem.Form]:
+        """A direction, and the functional of the energy's derivative (or minus the work) in it."""
+        energy, force = self._given
+        direction = self.functions.field()
+        if energy is None:
+            return direction, self._compile(ufl.action(force, direction))
+        return direction, self._compile(ufl.derivative(energy, self.functions.u, direction))
+
+    def slope(self, state: State, step: np.ndarray) -> np.ndarray:
+        """Derivative of the energy along a step (minus the force's work) by a form of its own."""
+        direction, form = self._along
+        self.functions.set(state)
+        direction.x.array[:] = step[self.functions.dofs]
+        return np.array([compat.assemble_scalar(form)])
 
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the assembled linear form to the displacement part of the local values."""

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from ufl_origami import kernels
 from ufl_origami.configuration import Configuration, State
@@ -26,11 +25,13 @@ class NodalLoad(Term):
         dofs: local unknowns (n, 3) of nodes, owned or ghost; contributions of all ranks add up.
         weights: (n,) share of each node (1 for a point, length for a line load).
         force: function of time: force (3,), per length for a line load.
+        kind: name under which the energy is booked.
     """
 
-    kinds = ("load",)
-
-    def __init__(self, dofs: np.ndarray, weights: np.ndarray, force: VectorFunction):
+    def __init__(
+        self, dofs: np.ndarray, weights: np.ndarray, force: VectorFunction, kind: str = "load"
+    ):
+        self.kinds = (kind,)
         self._dofs, self._weights, self._force = dofs, weights, force
         self._time = 0.0
 
@@ -50,18 +51,22 @@ class NodalLoad(Term):
         np.add.at(out, self._dofs, -self._forces())
 
 
-def area_load(functions: SheetFunctions, density: np.ndarray, direction: VectorFunction):
+def area_load(
+    functions: SheetFunctions, density: np.ndarray, direction: VectorFunction, kind: str = "load"
+):
     """Dead load per rest area, -int density f(t) . u dA.
 
     Args:
         functions: the scene's shared functions.
-        density: local values (nc,), 1 on the loaded triangles and 0 elsewhere.
-        direction: function of time: force per rest area (3,).
+        density: local values (nc,): 1 on the loaded triangles and 0 elsewhere, or masses per area.
+        direction: function of time: force per rest area (3,), or acceleration.
+        kind: name under which the energy is booked.
     """
     return _TimedForm(
         functions,
         direction,
         lambda f: {"energy": -functions.piecewise(density) * ufl.inner(f, functions.u) * ufl.dx},
+        kind,
     )
 
 
@@ -86,10 +91,10 @@ def follower_pressure(functions: SheetFunctions, density: np.ndarray, pressure: 
 class _TimedForm(FormTerm):
     """A load form with one vector that follows a function of time."""
 
-    def __init__(self, functions: SheetFunctions, value: VectorFunction, form):
-        self._vector = fem.Constant(functions.sheet.mesh, np.zeros(3))
+    def __init__(self, functions: SheetFunctions, value: VectorFunction, form, kind: str = "load"):
+        self._vector = functions.number(np.zeros(3))
         self._value = value
-        super().__init__("load", functions, **form(self._vector))
+        super().__init__(kind, functions, **form(self._vector))
 
     def set_time(self, time: float) -> None:
         """Set the vector to its value at a time."""

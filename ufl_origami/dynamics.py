@@ -1,0 +1,278 @@
+"""One call that follows a scene in time and keeps what it finds (see recording.py)."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from petsc4py import PETSc
+
+import numpy as np
+
+from ufl_origami.checkpoint import Memory
+from ufl_origami.collective import together
+from ufl_origami.discretise import build
+from ufl_origami.energy_book import EnergyBook
+from ufl_origami.errors import InputError, SceneError
+from ufl_origami.history import History, Record, Row, time_row
+from ufl_origami.interrupt import InterruptRequest
+from ufl_origami.model import Model
+from ufl_origami.problem import Problem
+from ufl_origami.recording import Disk, Log, ProgressBar
+from ufl_origami.scene import Scene
+from ufl_origami.solvers.admissible import Admissible
+from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep
+from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
+from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
+from ufl_origami.surroundings import make_motion
+from ufl_origami.terms.base import Term
+
+JUMP = 1e-9
+"""Distance over the sheet's largest coordinate by which prescribed motion may start off."""
+
+MOMENT = 1e-7
+"""Time over which the rate of prescribed motion is measured at the start."""
+
+
+@dataclass(frozen=True)
+class DynamicResult:
+    """A motion that reached its last stop.
+
+    Attributes:
+        model: the model in its last accepted state; `model.motion` has its rates.
+        steps: accepted steps of this call.
+        history: what was recorded at the start and after each step, the same on all ranks.
+    """
+
+    model: Model
+    steps: list[TimeStep]
+    history: History
+
+
+def solve_dynamic(
+    scene: Scene | Model,
+    stops: Sequence[float],
+    time: TimeSettings,
+    *,
+    scheme: str | Scheme = "bdf2",
+    output: str | Path | None = None,
+    record: Record | None = None,
+    newton: NewtonSettings | None = None,
+    resume: bool = False,
+    progress: bool | None = None,
+    on_accept: Callable[[TimeStep, Model], None] | None = None,
+) -> DynamicResult:
+    """Follow a scene in time from time 0; collective.
+
+    Numbers that the scene declares (loads, gravity, fields) act in full; functions are functions of
+    time. The first Ctrl-C stops after the step under way is accepted, on all ranks; a second one at
+    once.
+
+    Args:
+        scene: a scene at rest, or a model in the state that a static path or an earlier motion left
+            it in (numbers then keep the load factor reached; it is at rest again unless it moved).
+        stops: increasing times to be hit exactly.
+        time: step sizes.
+        scheme: "bdf2" (second order), "implicit_euler", or a scheme of one's own.
+        output: folder for history, fields and checkpoint (what an earlier run left there is
+            replaced unless this run resumes it); None keeps the history in memory only.
+        record: what history and fields hold.
+        newton: method and tolerances of one step.
+        resume: continue the run in `output` from its last accepted step, on any number of ranks;
+            on one rank, with the settings it had, to the same bits.
+        progress: show a progress bar; None: where the error stream is a terminal.
+        on_accept: called on all ranks with each accepted step and the model in its state, after
+            history, fields and checkpoint are written.
+
+    Raises:
+        SolveError: a step failed at the smallest size; all accepted steps are on disk and the model
+            is in the last accepted state.
+        KeyboardInterrupt: after Ctrl-C; all accepted steps are on disk.
+        InputError: scene or record are incomplete or wrong, prescribed motion jumps at the start,
+            the sheet starts inside an obstacle, or there is no run of this scene to resume.
+        OSError: a file could not be written.
+
+    Warns:
+        MeshWarning: the mesh cannot represent the form.
+        AccuracyWarning: the smallest step was too long for the tolerance.
+        ContactWarning: a gap has nearly closed.
+    """
+    if resume and output is None:
+        raise InputError("resume: name the output folder of the run to resume")
+    model = scene if isinstance(scene, Model) else build(scene)
+    record = record or Record()
+    run = _start(model, time, find_scheme(scheme), newton or NewtonSettings(), record)
+    log, steps = Log(model, record, run), []
+    with ExitStack() as stack:
+        disk = None
+        if output is not None:
+            disk = stack.enter_context(Disk(log, Path(output)))
+        if resume and disk:
+            disk.resume()
+        else:
+            log.observe()
+            if disk:
+                disk.begin()
+        bar = stack.enter_context(closing(ProgressBar(model, stops, progress, "time")))
+        request = stack.enter_context(InterruptRequest())
+
+        def accept(step: TimeStep, x: PETSc.Vec) -> None:
+            run.accept(step)
+            steps.append(step)
+            log.observe()
+            if disk:
+                disk.observe()
+            bar.observe(step)
+            if on_accept:
+                on_accept(step, model)
+            if request.agreed(model.sheet.comm):
+                raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
+
+        run.path.run(model.x, stops, accept)
+    return DynamicResult(model, steps, log.history)
+
+
+def _start(
+    model: Model, time: TimeSettings, scheme: Scheme, newton: NewtonSettings, record: Record
+) -> "_Run":
+    """Everything that moves a model, checked at its start; collective."""
+    begin = _set_clock(model)
+    if model.motion is None:
+        model.motion = make_motion(model.scene, model.configuration, model.functions)
+    problem, motion = model.problem, model.motion
+    for contact in model.contacts:
+        contact.check(model.state)
+    _check_supports(model, begin)
+    terms: list[Term] = [*problem.terms, motion.inertia, *model.in_time]
+    whole = Problem(model.configuration, terms, problem.constraints)
+    whole.set_time(begin)
+    at = Instant(begin, model.x.copy(), motion.v.copy())
+    book = EnergyBook(problem, whole, motion, at) if record.energies else None
+    path = TimePath(
+        whole,
+        NewtonSolver(whole, newton),
+        motion.inertia,
+        scheme,
+        time,
+        [at],
+        Admissible(model),
+        book,
+    )
+    return _Run(path, model, book)
+
+
+def _set_clock(model: Model) -> float:
+    """Time at which the motion starts; the load factor is held from there on.
+
+    A model that moved before goes on in time. Another one starts at time 0: with the full loads,
+    or with those of the load factor that a static path has reached.
+    """
+    if model.motion is not None:
+        return model.problem.time
+    model.load_factor.held = model.problem.time or 1.0
+    model.problem.set_time(0.0)
+    return 0.0
+
+
+def _check_supports(model: Model, begin: float) -> None:
+    """Refuse prescribed motion that jumps at the start, else take its rate; collective.
+
+    Raises:
+        SceneError: on all ranks.
+    """
+    constraints, motion = model.problem.constraints, model.motion
+    assert motion is not None
+    constraints.check(begin)
+    values, dofs = constraints.values(begin), constraints.dofs
+    with together(model.sheet.comm):
+        jump = np.abs(values - model.x.array_r[dofs]).max(initial=0.0)
+        if jump > JUMP * max(1.0, np.abs(model.sheet.rest).max(initial=0.0)):
+            raise SceneError(
+                f"prescribed motion jumps by {jump:.3g} at time {begin:g}: give a function of time "
+                "that starts where the sheet is, or follow a static path first"
+            )
+    motion.v.array_w[dofs] = (constraints.values(begin + MOMENT) - values) / MOMENT
+
+
+@dataclass
+class _Run:
+    """A motion as it is recorded."""
+
+    path: TimePath
+    model: Model
+    book: EnergyBook | None
+    step: TimeStep = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.step = TimeStep(0, self.path.past[0].time)
+
+    @property
+    def rows(self) -> int:
+        """The start, and one a step."""
+        return self.path.number + 1
+
+    @property
+    def terms(self) -> Sequence[Term]:
+        """All terms of the time steps."""
+        return self.path.problem.terms
+
+    def accept(self, step: TimeStep) -> None:
+        """Put the model into the state of an accepted step."""
+        self.step = step
+        model = self.model
+        model.problem.time, model.balance = step.time, self.path.problem
+        if model.motion:
+            self.path.past[0].v.copy(model.motion.v)
+
+    def columns(self) -> Row:
+        """Columns of the last step, and the energy book."""
+        row = time_row(self.step)
+        return {**row, **self.book.account.columns()} if self.book else row
+
+    def vectors(self) -> dict[str, PETSc.Vec]:
+        """Rates of the last state, unknowns and rates of those before it.
+
+        Where there are none yet, the oldest stands in.
+        """
+        past = self.path.past
+        vectors = {"rate": past[0].v}
+        for age in range(1, self.path.scheme.memory):
+            state = past[min(age, len(past) - 1)]
+            vectors |= {f"before{age}": state.q, f"before{age}.rate": state.v}
+        return vectors
+
+    def memory(self) -> Memory:
+        """Times of the last states, step sizes, solver's memory, energy book."""
+        path = self.path
+        return {
+            "scheme": path.scheme.name,
+            "times": [state.time for state in path.past],
+            "steps": path.number,
+            "size": path.size,
+            "shift": path.newton.shift,
+            "book": self.book.memory() if self.book else None,
+            "last": asdict(self.step),
+        }
+
+    def recall(self, memory: Memory, vectors: dict[str, PETSc.Vec]) -> None:
+        """Take up where a checkpoint left the motion.
+
+        Raises:
+            InputError: it was followed by another scheme.
+        """
+        path = self.path
+        if (other := memory.get("scheme")) != path.scheme.name:
+            raise InputError(f"the run to resume has scheme {other!r}, not {path.scheme.name!r}")
+        named = [("", "rate")] + [(f"before{k}", f"before{k}.rate") for k in range(1, 9)]
+        path.past = [
+            Instant(time, vectors[q] if q else self.model.x.copy(), vectors[v])
+            for time, (q, v) in zip(memory["times"], named, strict=False)
+        ]
+        path.number, path.size = memory["steps"], memory["size"]
+        path.newton.shift = memory["shift"]
+        path.problem.set_time(memory["time"])
+        if self.book and memory["book"]:
+            self.book.recall(memory["book"])
+        self.step = TimeStep(**memory["last"])
+        if self.model.motion:
+            path.past[0].v.copy(self.model.motion.v)

@@ -1,0 +1,157 @@
+"""Energy book of a motion: where energy is, what came in, what was lost, and what does not add up.
+
+Between the states 0 and 1 of a step, with dq = q1 - q0, r the forces that no energy has (follower
+loads, friction) and c the prescribed unknowns,
+
+    T1 - T0 + Pi(q1, t1) - Pi(q0, t0) = work - dissipation + imbalance
+
+    work        Pi(q0, t1) - Pi(q0, t0): what moves in time (loads, fields, obstacles, rest
+                angles); reactions . dq_c; r . dq; what friction takes from moving obstacles
+    damping     damping force . dq
+    friction    friction force . (dq - the obstacle's way)
+    integrator  dq . M a1 - (T1 - T0)  +  Pi(q0, t1) - Pi(q1, t1) + dPi(q1, t1) . dq
+
+The integrator's share follows from its own formula: the kinetic part from positions and rates
+alone (for implicit Euler it is |v1 - v0|^2_M / 2), the potential part from energies alone, dPi
+along the step included (`Term.slope`). No force enters it. So the imbalance is the residual of the
+equations of motion along the step, with forces taken from the energies: it vanishes to the solver's
+tolerance, and does not where a force is not the gradient of its energy.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from ufl_origami.motion import Motion
+from ufl_origami.problem import Problem
+from ufl_origami.solvers.schemes import Formula, Instant, combination
+
+LOSSES = ("integrator", "damping", "friction")
+"""Ways in which energy is lost."""
+
+
+@dataclass
+class Account:
+    """State of the book.
+
+    Attributes:
+        energies: potential energy by kind.
+        kinetic: kinetic energy.
+        start: total at the start.
+        work: work done since then.
+        losses: energy lost since then, by the ways of `LOSSES`.
+    """
+
+    energies: dict[str, float]
+    kinetic: float
+    start: float
+    work: float = 0.0
+    losses: dict[str, float] = field(default_factory=lambda: dict.fromkeys(LOSSES, 0.0))
+
+    @property
+    def total(self) -> float:
+        """Kinetic and potential energy."""
+        return self.kinetic + sum(self.energies.values())
+
+    @property
+    def imbalance(self) -> float:
+        """What the total differs from the start by, beyond work and losses."""
+        return self.total - self.start - self.work + sum(self.losses.values())
+
+    def columns(self) -> dict[str, float]:
+        """Columns of the history."""
+        return {
+            "energy_kinetic": self.kinetic,
+            **{f"energy_{kind}": value for kind, value in self.energies.items()},
+            "energy_total": self.total,
+            "work": self.work,
+            **{f"lost_{way}": value for way, value in self.losses.items()},
+            "imbalance": self.imbalance,
+        }
+
+
+class EnergyBook:
+    """Keeps the account of one motion.
+
+    Args:
+        physical: problem of the terms that have an energy or a force in statics, too.
+        whole: the problem of the time steps, inertia, damping and friction included.
+        motion: masses and rates.
+        at: state at the start.
+
+    Attributes:
+        account: after the last accepted step.
+        scale: largest energy so far, see `reach`.
+    """
+
+    def __init__(self, physical: Problem, whole: Problem, motion: Motion, at: Instant):
+        self.physical, self.whole, self.motion = physical, whole, motion
+        energies, kinetic = physical.energies(at.q), motion.kinetic_energy(at.v)
+        self.account = Account(energies, kinetic, kinetic + sum(energies.values()))
+        self._forces, self._first = at.q.duplicate(), energies
+        self.scale = kinetic
+
+    def memory(self) -> dict:
+        """The account and what it refers to, for a checkpoint."""
+        return {"account": asdict(self.account), "first": self._first, "scale": self.scale}
+
+    def recall(self, memory: Mapping) -> None:
+        """Go on from the account of an earlier run."""
+        self.account = Account(**memory["account"])
+        self._first, self.scale = memory["first"], memory["scale"]
+
+    def draft(self, old: Instant, new: Instant, formula: Formula) -> Account:
+        """The account after a step, while the terms stand at its end; collective."""
+        account, way = self.account, combination((1.0, new.q), (-1.0, old.q))
+        here = self.physical.energies(old.q)
+        energies, slopes = self.physical.energies(new.q), self.physical.slopes(new.q, way)
+        bregman = sum(here[k] - energies[k] + slopes.get(k, 0.0) for k in here)
+        kinetic = self.motion.kinetic_energy(new.v)
+        pull = combination((formula.inertia, new.q), (-formula.inertia, formula.target))
+        inertial = self.motion.product(way, pull) - (kinetic - account.kinetic)
+        work = sum(here.values()) - sum(account.energies.values())
+        work += self.physical.work(new.q, way) + self._reactions(new, way)
+        losses = {**account.losses, "integrator": account.losses["integrator"] + inertial + bregman}
+        for kind in ("damping", "friction"):
+            taken, given = self._dissipated(kind, new, way, old.time)
+            losses[kind] += taken
+            work += given
+        return Account(energies, kinetic, account.start, account.work + work, losses)
+
+    def post(self, account: Account) -> None:
+        """Adopt the account of an accepted step."""
+        self.account = account
+        self.scale = max(self.scale, self.reach(account))
+
+    def reach(self, account: Account) -> float:
+        """Largest energy of an account, potential ones counted from the start."""
+        moved = (value - self._first[kind] for kind, value in account.energies.items())
+        return max(account.kinetic, *map(abs, moved))
+
+    def loss(self, account: Account) -> float:
+        """What the integrator took or gave in the step to an account, over the largest energy."""
+        taken = abs(account.losses["integrator"] - self.account.losses["integrator"])
+        scale = max(self.scale, self.reach(account))
+        return taken / scale if taken > 0 else 0.0
+
+    def _reactions(self, new: Instant, way) -> float:
+        """Work of the supports over a step."""
+        dofs = self.whole.constraints.dofs
+        if not self.whole.configuration.sum(len(dofs)):
+            return 0.0
+        self.whole.forces(new.q, self._forces)
+        share = float(np.dot(self._forces.array_r[dofs], way.array_r[dofs]))
+        return float(self.whole.configuration.sum(share))
+
+    def _dissipated(self, kind: str, new: Instant, way, since: float) -> tuple[float, float]:
+        """Energy that the terms of one kind took over a step, and what moving bodies gave them."""
+        state, configuration = self.whole.state(new.q), self.whole.configuration
+        step, lost, given = configuration.to_local(way), 0.0, 0.0
+        for term in self.whole.terms:
+            if term.kinds == (kind,):
+                share = float(term.slope(state, step).sum())
+                drive = term.drive(state, since)
+                lost, given = lost + share + drive, given + drive
+        lost, given = configuration.sum([lost, given])
+        return float(lost), float(given)

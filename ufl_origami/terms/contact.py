@@ -1,0 +1,198 @@
+"""Contact with a rigid obstacle: the barrier's energy at the nodes, by their share of rest area."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from mpi4py import MPI
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from ufl_origami.barrier import Barrier, barrier_energy
+from ufl_origami.collective import together
+from ufl_origami.configuration import Configuration, State
+from ufl_origami.errors import ContactWarning, SolveError
+from ufl_origami.obstacles import Obstacle
+from ufl_origami.terms.base import MatrixTerm
+from ufl_origami.terms.form import FormTerm, SheetFunctions
+from ufl_origami.terms.gaps import Gaps
+
+CLOSED = 1e-6
+"""Gap over the barrier's reach below which a state is refused: the barrier gives way."""
+
+NEARLY_CLOSED = 1e-2
+"""Gap over the barrier's reach below which a warning is given."""
+
+Motion = Callable[[float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """An obstacle as a scene has it.
+
+    Attributes:
+        name: its name.
+        obstacle: the body.
+        barrier: its barrier.
+        motion: function of time: displacement (3,).
+    """
+
+    name: str
+    obstacle: Obstacle
+    barrier: Barrier
+    motion: Motion
+
+    @property
+    def label(self) -> str:
+        """How messages call it."""
+        return f"obstacle {self.name!r}"
+
+
+class Touch(NamedTuple):
+    """What contact and friction share of one surface.
+
+    Attributes:
+        surface: the surface.
+        gaps: distances of the nodes that can touch.
+        share: function, 1 at these nodes and 0 elsewhere.
+        place: UFL constant, the obstacle's displacement.
+    """
+
+    surface: Surface
+    gaps: Gaps
+    share: fem.Function
+    place: fem.Constant
+
+
+def touch(functions: SheetFunctions, surface: Surface, nodes: np.ndarray) -> Touch:
+    """Distances and functions of a surface for the nodes (nd,) that can touch it."""
+    element = ("Lagrange", 2 if functions.second_order else 1)
+    share = fem.Function(fem.functionspace(functions.sheet.mesh, element))
+    share.x.array[:] = nodes
+    gaps = Gaps(functions, surface.obstacle, nodes)
+    return Touch(surface, gaps, share, functions.number(surface.motion(0.0)))
+
+
+class ContactTerm(MatrixTerm):
+    """Barrier between the sheet and one obstacle.
+
+    Args:
+        configuration: numbering of the unknowns.
+        functions: the scene's shared functions.
+        at: surface, nodes, gaps.
+
+    Attributes:
+        at: surface, nodes, gaps.
+        smallest: smallest accepted gap so far.
+    """
+
+    kinds = ("contact",)
+    bounded = True
+
+    def __init__(self, configuration: Configuration, functions: SheetFunctions, at: Touch):
+        self.configuration, self.functions, self.at = configuration, functions, at
+        number, barrier = functions.number, at.surface.barrier
+        x = ufl.SpatialCoordinate(functions.sheet.mesh) + functions.u - at.place
+        density = barrier_energy(
+            at.surface.obstacle.distance(x, number),
+            number(barrier.stiffness),
+            number(barrier.distance),
+        )
+        self._form = FormTerm("contact", functions, energy=at.share * density * functions.nodal())
+        self.smallest = np.inf
+        self._place = np.asarray(at.surface.motion(0.0), dtype=float)
+        self._seen: tuple[np.ndarray, float] | None = None
+
+    def check(self, state: State) -> None:
+        """Refuse a start inside the obstacle; collective.
+
+        Raises:
+            SceneError: on all ranks.
+        """
+        with together(self.configuration.comm):
+            self.at.gaps.check(self._relative(state.q, self._place), self.at.surface.label)
+
+    def set_time(self, time: float) -> None:
+        """Move the obstacle to its place at a time."""
+        self._place = np.asarray(self.at.surface.motion(time), dtype=float)
+        self.at.place.value[:] = self._place
+
+    def _relative(self, q: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Displacements (nd, 3) of the nodes in the obstacle's frame."""
+        return q[self.functions.dofs].reshape(-1, 3) - place
+
+    def gap(self, state: State) -> float:
+        """Smallest distance of this rank's nodes, inf without any."""
+        return float(self.at.gaps.at(self._relative(state.q, self._place)).min(initial=np.inf))
+
+    def near(self, state: State) -> bool:
+        """Whether a node of this rank is within the barrier's reach, or may be.
+
+        A distance changes by no more than its node moves: as long as no node has come far enough
+        since they were last measured, they are not measured again.
+        """
+        here, reach = self._relative(state.q, self._place), self.at.surface.barrier.distance
+        if self._seen is not None:
+            moved = np.linalg.norm(here - self._seen[0], axis=1).max(initial=0.0)
+            if self._seen[1] - moved > reach:
+                return False
+        self._seen = here, float(self.at.gaps.at(here).min(initial=np.inf))
+        return self._seen[1] <= reach
+
+    def energies(self, state: State) -> np.ndarray:
+        """Energy of this rank's nodes."""
+        return self._form.energies(state) if self.near(state) else np.zeros(1)
+
+    def slope(self, state: State, step: np.ndarray) -> np.ndarray:
+        """Derivative of the energy along a step; collective where it is compiled."""
+        return self._form.slope(state, step)
+
+    def add_residual(self, state: State, out: np.ndarray) -> None:
+        """Subtract the forces."""
+        if self.near(state):
+            self._form.add_residual(state, out)
+
+    def add_tangent(self, state: State, matrix) -> None:
+        """Add the barrier's stiffness."""
+        if self.near(state):
+            self._form.add_tangent(state, matrix)
+
+    def longest_step(self, state: State, step: np.ndarray) -> float:
+        """Part of a step that leaves a tenth of every gap.
+
+        The state's own time says where the obstacle is at its start.
+        """
+        start = self._relative(state.q, np.asarray(self.at.surface.motion(state.time)))
+        return self.at.gaps.free_part(start, self._relative(state.q + step, self._place))
+
+    def objection(self, state: State) -> str:
+        """Refuse a gap that has closed.
+
+        Raises:
+            SolveError: always then, since a shorter step does not make the barrier stronger.
+        """
+        gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
+        surface, reach = self.at.surface, self.at.surface.barrier.distance
+        if gap > CLOSED * reach:
+            return ""
+        raise SolveError(
+            f"{surface.label}: its barrier (stiffness {surface.barrier.stiffness:.4g}, distance "
+            f"{reach:.4g}) is too weak for this impact: the gap closed to {gap / reach:.1e} of the "
+            "distance; suggest a barrier for the speed of the impact"
+        )
+
+    def accept(self, state: State) -> None:
+        """Remember the smallest gap.
+
+        Warns:
+            ContactWarning: the gap is below a hundredth of the barrier's reach.
+        """
+        gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
+        reach = self.at.surface.barrier.distance
+        if gap < min(NEARLY_CLOSED * reach, self.smallest) and self.configuration.comm.rank == 0:
+            text = f"{self.at.surface.label}: the gap closed to {gap / reach:.2%} of the barrier's"
+            warnings.warn(f"{text} distance: a stiffer one is due", ContactWarning, stacklevel=2)
+        self.smallest = min(self.smallest, gap)
