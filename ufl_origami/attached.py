@@ -14,6 +14,7 @@ from mpi4py import MPI
 import numpy as np
 from scipy import optimize
 
+from ufl_origami.collective import reduced
 from ufl_origami.errors import SceneError
 from ufl_origami.scene_surroundings import MassSpec
 
@@ -34,9 +35,9 @@ def spread_body(comm: MPI.Comm, rest: np.ndarray, spec: MassSpec) -> np.ndarray:
         SceneError: on all ranks: no positive masses on the nodes have the body's moments.
     """
     label, count = f"rigid inertia {spec.name!r}", comm.allreduce(len(rest))
-    middle = comm.allreduce(rest.sum(axis=0)) / count
+    middle = reduced(comm, rest.sum(axis=0)) / count
     arms = rest - middle
-    extents, axes = np.linalg.eigh(comm.allreduce(arms.T @ arms) / count)
+    extents, axes = np.linalg.eigh(reduced(comm, arms.T @ arms) / count)
     size = float(np.sqrt(max(extents[-1], 0.0))) or 1.0
     used = np.concatenate([[True], extents > (FLAT * size) ** 2])
     wanted = _moments(spec, middle, axes / size)
@@ -75,10 +76,10 @@ def _entropic(comm: MPI.Comm, basis: np.ndarray, wanted: np.ndarray, count: int)
         return float(comm.allreduce(masses(y).sum()) - y @ wanted)
 
     def gradient(y: np.ndarray) -> np.ndarray:
-        return comm.allreduce(basis.T @ masses(y)) - wanted
+        return reduced(comm, basis.T @ masses(y)) - wanted
 
     def hessian(y: np.ndarray) -> np.ndarray:
-        return comm.allreduce(basis.T @ (masses(y)[:, None] * basis))
+        return reduced(comm, basis.T @ (masses(y)[:, None] * basis))
 
     start = np.zeros(len(wanted))
     options = {"gtol": 1e-13, "maxiter": 500}

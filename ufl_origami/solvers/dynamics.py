@@ -19,6 +19,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
+from ufl_origami.collective import reduced
 from ufl_origami.errors import AccuracyWarning, InputError, SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.clearance import clear_start
@@ -380,5 +381,5 @@ def sheet_size(problem: Problem) -> float:
     configuration = problem.configuration
     rest = configuration.sheet.rest
     corners = np.concatenate([rest.max(axis=0, initial=-inf), (-rest).max(axis=0, initial=-inf)])
-    high_low = configuration.comm.allreduce(corners, op=MPI.MAX)
+    high_low = reduced(configuration.comm, corners, MPI.MAX)
     return float(np.linalg.norm(high_low[:3] + high_low[3:]))

@@ -18,7 +18,7 @@ from ufl_origami.terms.base import MatrixTerm
 
 JIT_OPTIONS = {"timeout": 300}
 
-MIDPOINT_WEIGHTS = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]) / 24
+MIDPOINT_WEIGHTS = 3 * [1 / 24] + 3 * [3 / 24]
 """Weights of corners and midpoints on the reference triangle: the corner rule on its four parts."""
 
 
@@ -92,7 +92,8 @@ class SheetFunctions:
         """
         if not self.second_order:
             return ufl.dx(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
-        rule = {"quadrature_points": self.node_points(), "quadrature_weights": MIDPOINT_WEIGHTS}
+        points, weights = self.node_points().tolist(), list(MIDPOINT_WEIGHTS)
+        rule = {"quadrature_points": points, "quadrature_weights": weights}
         return ufl.dx(metadata={"quadrature_rule": "custom", "quadrature_degree": 1, **rule})
 
     def node_points(self) -> np.ndarray:

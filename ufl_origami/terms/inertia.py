@@ -34,6 +34,7 @@ def mass_matrix(
     dx = ufl.dx(metadata=None if configuration.has_midpoints else lumped)
     form = fem.form(functions.piecewise(density) * ufl.inner(u, v) * dx, jit_options=JIT_OPTIONS)
     own = compat.local_matrix(form).tocoo()
+    own.eliminate_zeros()  # among them columns that only other ranks' entries have
     dofs, size = functions.dofs, configuration.num_local
     return sparse.csr_matrix((own.data, (dofs[own.row], dofs[own.col])), shape=(size, size))
 

@@ -16,6 +16,7 @@ import ufl
 from scipy.constants import mu_0
 from ufl.core.expr import Expr
 
+from ufl_origami.collective import reduced
 from ufl_origami.errors import SceneError
 from ufl_origami.terms.form import FormTerm, SheetFunctions, deformed_jacobian, pushed_forward
 
@@ -37,7 +38,7 @@ def leaves_its_panel(functions: SheetFunctions, remanence: np.ndarray) -> bool:
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     part = np.abs((remanence * normals).sum(axis=1)).max(initial=0.0)
     largest = np.abs(remanence).max(initial=0.0)
-    part, largest = sheet.comm.allreduce(np.array([part, largest]), op=MPI.MAX)
+    part, largest = reduced(sheet.comm, np.array([part, largest]), MPI.MAX)
     return bool(part > IN_PLANE * largest)
 
 
