@@ -23,11 +23,12 @@ class LinearLaw:
     """Spring K_r (phi - phi_0) per unit length.
 
     Attributes:
-        stiffness: K_r (moment per length and radian), number or function of time.
+        stiffness: K_r (moment per length and radian): number, array of the edges' values, or
+            function of time.
         rest_angle: phi_0 (radians): number, array of the edges' values, or function of time.
     """
 
-    stiffness: float | TimeFunction
+    stiffness: np.ndarray | float | TimeFunction
     rest_angle: np.ndarray | float | TimeFunction
 
     def __call__(self, angle: np.ndarray, time: float) -> tuple[np.ndarray, ...]:
@@ -38,7 +39,7 @@ class LinearLaw:
         return (
             0.5 * stiffness * opening**2,
             stiffness * opening,
-            np.full_like(angle, stiffness),
+            np.broadcast_to(stiffness, angle.shape),
         )
 
 

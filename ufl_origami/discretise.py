@@ -40,6 +40,7 @@ from ufl_origami.stencils import (
 from ufl_origami.surroundings import surrounding_terms
 from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
+from ufl_origami.terms.damping import ElasticTerms
 from ufl_origami.terms.form import SheetFunctions
 from ufl_origami.terms.membrane import MembraneForm
 from ufl_origami.terms.shell import Ghosts, ShellTerm
@@ -86,8 +87,24 @@ def build_ddg(scene: Scene) -> Model:
     problem = Problem(configuration, terms, constraints)
     problem.set_time(0.0)
     creases = first_springs(springs)
+
+    def elastic() -> ElasticTerms:
+        return ElasticTerms(
+            shell_term(scene, configuration, tables, rest), spring_terms(springs, configuration)
+        )
+
     return Model(
-        sheet, configuration, problem, shell, creases, x, scene, factor, functions, in_time
+        sheet,
+        configuration,
+        problem,
+        shell,
+        creases,
+        x,
+        scene,
+        load_factor=factor,
+        functions=functions,
+        in_time=in_time,
+        elastic=elastic,
     )
 
 

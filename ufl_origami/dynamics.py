@@ -24,7 +24,7 @@ from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
-from ufl_origami.surroundings import make_motion
+from ufl_origami.surroundings import damping_terms, make_motion
 from ufl_origami.terms.base import Term
 
 JUMP = 1e-9
@@ -144,6 +144,7 @@ def _start(
         contact.check(model.state)
     _check_supports(model, begin)
     terms: list[Term] = [*problem.terms, motion.inertia, *model.in_time]
+    terms += damping_terms(model, scheme.memory)
     whole = Problem(model.configuration, terms, problem.constraints)
     whole.set_time(begin)
     at = Instant(begin, model.x.copy(), motion.v.copy())

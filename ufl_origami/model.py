@@ -1,5 +1,6 @@
 """The discrete model of a scene: unknowns, terms, constraints, and what it can measure."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,8 +15,9 @@ from ufl_origami.scene import Scene
 from ufl_origami.scene_parts import LoadFactor
 from ufl_origami.sheet import SheetMesh
 from ufl_origami.sides import EdgeFan
-from ufl_origami.terms.base import Term
+from ufl_origami.terms.base import Keyed, Term
 from ufl_origami.terms.contact import ContactTerm
+from ufl_origami.terms.damping import ElasticTerms
 from ufl_origami.terms.form import SheetFunctions
 
 
@@ -35,6 +37,9 @@ class CreaseModel(Protocol):
 
 class PanelTerm(Protocol):
     """What a model asks of the term of its panels, whatever the discretisation."""
+
+    def history(self) -> dict[str, Keyed]:
+        """Branches of angles, see `Term.history`."""
 
     def element_energies(self, state: State) -> dict[str, np.ndarray]:
         """Energy of each owned triangle (num_owned_cells,), by kind."""
@@ -64,6 +69,7 @@ class Model:
         load_factor: factor of the numbers that the scene declares.
         functions: what the scene's forms share.
         in_time: terms that act in time only: friction.
+        elastic: makes copies of the elastic terms.
         motion: masses and rates, once the model moves.
         balance: problem whose residual is zero at the current state: with inertia in a time step.
     """
@@ -78,6 +84,7 @@ class Model:
     load_factor: LoadFactor
     functions: SheetFunctions
     in_time: list[Term]
+    elastic: Callable[[], ElasticTerms]
     motion: Motion | None = None
     balance: Problem | None = None
 

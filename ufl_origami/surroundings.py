@@ -10,7 +10,7 @@ from scipy import sparse
 from ufl_origami.attached import spread_body
 from ufl_origami.configuration import Configuration
 from ufl_origami.errors import SceneError
-from ufl_origami.model import place_nodes, place_vertices
+from ufl_origami.model import Model, place_nodes, place_vertices
 from ufl_origami.motion import Motion
 from ufl_origami.scene import Scene
 from ufl_origami.scene_parts import LoadFactor, vector_function
@@ -18,6 +18,7 @@ from ufl_origami.scene_surroundings import ObstacleSpec, field_varies
 from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.contact import ContactTerm, Surface, touch
+from ufl_origami.terms.damping import MassDamping, ViscousFold, ViscousShell
 from ufl_origami.terms.form import SheetFunctions
 from ufl_origami.terms.friction import FrictionTerm
 from ufl_origami.terms.inertia import Mass, mass_matrix
@@ -169,3 +170,29 @@ def touching(
     for place in places:
         share[node[place_nodes(configuration, place).dofs[:, 0]]] = 1.0
     return share
+
+
+def damping_terms(model: Model, memory: int) -> list[Term]:
+    """Damping of a model that is about to move.
+
+    Args:
+        model: the model in its state at the start, its motion made.
+        memory: accepted states from which the scheme makes rates.
+
+    Raises:
+        SceneError: damping in proportion to the stiffness of a membrane that is a form.
+    """
+    terms: list[Term] = []
+    for spec in model.scene.dampings:
+        if spec.mass and model.motion:
+            terms.append(MassDamping(model.motion.mass, spec.mass))
+        if spec.stiffness:
+            if model.scene.membrane == "ufl":
+                raise SceneError("damping in proportion to the stiffness needs membrane='kernel'")
+            copies = model.elastic()
+            branches = model.shell.history()
+            copies.shell.restore({name: share.values for name, share in branches.items()})
+            terms.append(ViscousShell(copies.shell, spec.stiffness, memory, model.state))
+            first = 3 * model.configuration.nv
+            terms += [ViscousFold(fold, spec.stiffness, first) for fold in copies.folds]
+    return terms

@@ -25,6 +25,7 @@ from ufl_origami.scene_parts import LoadFactor
 from ufl_origami.sides import edge_fan, edge_sides
 from ufl_origami.surroundings import surrounding_terms
 from ufl_origami.terms.base import Term
+from ufl_origami.terms.damping import ElasticTerms
 from ufl_origami.terms.form import SheetFunctions
 from ufl_origami.terms.loads import Amplitude
 
@@ -47,14 +48,19 @@ def build_fem(scene: Scene) -> Model:
     x = rest_vector(configuration, fans, angles)
     n = sheet.num_owned_cells
     elements = flat_elements(rest[:n, :3], ~np.isin(sheet.cell_edges[:n], clamped))
-    shell = FemShellTerm(
-        configuration,
-        elements,
-        tilt_table(configuration, sides),
-        panel_data(scene),
-        clamped_sides(scene),
-        configuration.state(x, 0.0),
-    )
+    start = x.copy()
+
+    def panels() -> FemShellTerm:
+        return FemShellTerm(
+            configuration,
+            elements,
+            tilt_table(configuration, sides),
+            panel_data(scene),
+            clamped_sides(scene),
+            configuration.state(start, 0.0),
+        )
+
+    shell = panels()
 
     def nodes(state: State) -> np.ndarray:
         return rest + state.q[dofs]
@@ -65,8 +71,11 @@ def build_fem(scene: Scene) -> Model:
 
     functions, factor = SheetFunctions.create(configuration), LoadFactor()
     springs = fem_springs(scene, configuration, fans, angles, nodes)
-    terms: list[Term] = [shell]
-    terms += [FoldTerm(configuration, spring) for spring in springs if not spring.spec.stiff]
+
+    def folds() -> list[FoldTerm]:
+        return [FoldTerm(configuration, spring) for spring in springs if not spring.spec.stiff]
+
+    terms: list[Term] = [shell, *folds()]
     terms += load_terms(scene, configuration, functions, factor, moment)
     around, in_time = surrounding_terms(scene, configuration, functions, factor)
     terms += around + [maker(configuration, functions) for maker in scene.terms]
@@ -76,7 +85,17 @@ def build_fem(scene: Scene) -> Model:
     problem.set_time(0.0)
     creases: dict[str, CreaseModel] = {s.spec.name: s.crease for s in reversed(springs)}
     return Model(
-        sheet, configuration, problem, shell, creases, x, scene, factor, functions, in_time
+        sheet,
+        configuration,
+        problem,
+        shell,
+        creases,
+        x,
+        scene,
+        load_factor=factor,
+        functions=functions,
+        in_time=in_time,
+        elastic=lambda: ElasticTerms(panels(), folds()),
     )
 
 

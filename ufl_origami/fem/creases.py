@@ -160,7 +160,8 @@ class FoldTerm(StencilTerm):
 
     def __init__(self, configuration: Configuration, spring: FemSpring):
         crease = spring.crease
-        self.crease, self._spring_law, self._time = crease, spring.law(), 0.0
+        self.crease, self._given, self._time = crease, spring.law(), 0.0
+        self._laws = [self._given, self._given]
         dofs = np.where(crease.slot >= 0, 3 * configuration.nv + crease.slot, -1)
         self._dofs = dofs.reshape(-1, 2).astype(np.int32)
         self._rate = np.repeat(crease.coefficient, 2, axis=0)
@@ -176,7 +177,8 @@ class FoldTerm(StencilTerm):
 
     def _law(self, state: State) -> list[np.ndarray]:
         """Energy, moment and stiffness (2 n,) of the points, times their lengths."""
-        points = [self._spring_law(a, self._time) for a in self.crease.angles(state.scalars).T]
+        angles = self.crease.angles(state.scalars).T
+        points = [law(a, self._time) for law, a in zip(self._laws, angles, strict=True)]
         kinds = zip(*points, strict=True)
         return [self._share * np.stack(kind, axis=1).ravel() for kind in kinds]
 
@@ -194,6 +196,11 @@ class FoldTerm(StencilTerm):
         """Write the rotational stiffness at each Gauss point."""
         k = self._rate
         blocks[0][:] = self._law(state)[2][:, None, None] * k[:, :, None] * k[:, None, :]
+
+    def refer(self, scalars: np.ndarray, factor: float) -> None:
+        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor."""
+        angles = self.crease.angles(scalars).T
+        self._laws = [LinearLaw(factor * self._given(a, self._time)[2], a) for a in angles]
 
     def largest_turn(self, state: State, step: np.ndarray) -> float:
         """Largest change (radians) of the virtual fold angles over a step."""

@@ -80,7 +80,9 @@ class FemShellTerm(StencilTerm):
         coefficient = table.coefficient.reshape(n, 12)
         self._angle_rate = np.repeat(self._weights, 2, axis=2) * coefficient[:, None, :]
         self.offset = np.zeros((n, 6))
-        self._natural = np.zeros((n, 9))
+        self._natural: np.ndarray = np.zeros((n, 9))
+        self._reference: tuple[np.ndarray, np.ndarray] = np.zeros((n, 9)), np.zeros((n, 12))
+        self._given = self._bend, self._stretch, self._bend_root, self._stretch_root
         self._set_rest(rest, elements)
         self._moment, self._force = np.zeros((n, 9)), np.zeros((n, 12))
         self._last: _Linearisation | None = None
@@ -126,12 +128,27 @@ class FemShellTerm(StencilTerm):
     def _bending_pairing(self, state: State) -> np.ndarray:
         """Bending pairings (n, 9) at a state that is placed."""
         tilts = self.table.tilts(state.scalars) + self.offset
-        inside = self.pairings.value("curvature") - self._natural
+        inside = self.pairings.value("curvature") - self._natural - self._reference[0]
         return inside + self.pairings.value("angle") + np.einsum("nrp,np->nr", self._weights, tilts)
 
     def _membrane_pairing(self) -> np.ndarray:
         """Membrane pairings (n, 12) at a state that is placed."""
-        return np.hstack([self.pairings.value("edge"), self.pairings.value("cell")])
+        values = np.hstack([self.pairings.value("edge"), self.pairings.value("cell")])
+        return values - self._reference[1]
+
+    def strains(self, state: State) -> Keyed:
+        """Pairings (n, 21) with the kinematics, by input cell."""
+        self._place(state)
+        pairings = np.hstack([self._bending_pairing(state), self._membrane_pairing()])
+        return Keyed(self._input_cell, pairings + np.hstack(self._reference))
+
+    def refer(self, strains: np.ndarray, factor: float) -> None:
+        """Take pairings (n, 21) as stress-free, and the stiffness times a factor."""
+        self._reference = strains[:, :9], strains[:, 9:]
+        self._bend, self._stretch = (factor * matrix for matrix in self._given[:2])
+        root = np.sqrt(factor)
+        self._bend_root, self._stretch_root = (root * matrix for matrix in self._given[2:])
+        self._last = None
 
     def stencils(self) -> list[np.ndarray]:
         """Local unknowns of the triangles: 18 positions, 12 angles."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ufl_origami.configuration import Configuration, State
-from ufl_origami.crease_laws import CreaseLaw
+from ufl_origami.crease_laws import CreaseLaw, LinearLaw
 from ufl_origami.terms.base import StencilTerm
 
 
@@ -50,6 +50,7 @@ class CreaseTerm(StencilTerm):
 
     def __init__(self, configuration: Configuration, edges: CreaseEdges, law: CreaseLaw):
         self.edges, self.law = edges, law
+        self._given = law
         self._dofs = np.where(edges.slot >= 0, 3 * configuration.nv + edges.slot, -1).astype(
             np.int32
         )
@@ -76,6 +77,11 @@ class CreaseTerm(StencilTerm):
         moment = self._law(state)[1][:, None] * self.edges.coefficient
         used = self._dofs >= 0
         np.add.at(out, self._dofs[used], moment[used])
+
+    def refer(self, scalars: np.ndarray, factor: float) -> None:
+        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor."""
+        angle = self.edges.angle(scalars)
+        self.law = LinearLaw(factor * self._given(angle, self._time)[2], angle)
 
     def largest_turn(self, state: State, step: np.ndarray) -> float:
         """Largest change (radians) of the virtual fold angles over a step."""

@@ -1,4 +1,4 @@
-"""Inertia of one time step: inertia/2 |q - target|^2_M, and the mass M.
+"""Masses, and the incremental potential of inertia in one time step, inertia/2 |q - target|^2_M.
 
 M comes from the UFL form int rho h u . v dA over the rest area. On P1 displacements it is
 integrated at the vertices, which lumps it: a third of each triangle at its corners. On P2
@@ -6,6 +6,7 @@ displacements it stays consistent, since lumping costs the element its order. Ma
 added on the diagonal. Angles have no mass.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,39 +67,35 @@ class Mass:
         return row[on], data[on], np.column_stack([row[~on], col[~on]]), data[~on]
 
 
-class InertiaTerm(StencilTerm):
-    """The incremental potential of the masses.
+class MassTerm(StencilTerm):
+    """A potential factor/2 |q - reference|^2_M within a time step.
 
     Args:
         mass: mass matrix.
     """
 
-    kinds = ("inertia",)
-
     def __init__(self, mass: Mass):
         self.mass = mass
         diagonal, self._lumped, off, self._coupled = mass.pairs()
         self._dofs = diagonal[:, None].astype(np.int32), off.astype(np.int32)
-        self._rates: Rates | None = None
+        self._factor, self._reference = 0.0, np.zeros(mass.matrix.shape[0])
+
+    @abstractmethod
+    def pull(self, rates: Rates) -> tuple[float, np.ndarray]:
+        """Factor and reference (num_local,) in a time step."""
 
     def begin_step(self, rates: Rates) -> None:
-        """Take over factor and target."""
-        self._rates = rates
-
-    def _off(self, state: State) -> tuple[float, np.ndarray]:
-        """Factor and distance (num_local,) from the target."""
-        assert self._rates is not None, "inertia acts within a time step only"
-        return self._rates.inertia, state.q - self._rates.target
+        """Take over factor and reference."""
+        self._factor, self._reference = self.pull(rates)
 
     def energies(self, state: State) -> np.ndarray:
-        """This rank's share of the incremental potential."""
-        factor, off = self._off(state)
-        return np.array([0.5 * factor * self.mass.product(off, off)])
+        """This rank's share of the potential."""
+        off = state.q - self._reference
+        return np.array([0.5 * self._factor * self.mass.product(off, off)])
 
     def add_residual(self, state: State, out: np.ndarray) -> None:
-        """Add mass times acceleration."""
-        factor, off = self._off(state)
-        out += factor * self.mass.times(off)
+        """Add the factor times mass times distance."""
+        out += self._factor * self.mass.times(state.q - self._reference)
 
     def stencils(self) -> list[np.ndarray]:
         """Unknowns with mass, and pairs of them."""
@@ -106,7 +103,16 @@ class InertiaTerm(StencilTerm):
 
     def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
         """Write the factor times the masses."""
-        factor, _ = self._off(state)
-        blocks[0][:, 0, 0] = factor * self._lumped
+        blocks[0][:, 0, 0] = self._factor * self._lumped
         blocks[1][:] = 0.0
-        blocks[1][:, 0, 1] = blocks[1][:, 1, 0] = factor * self._coupled
+        blocks[1][:, 0, 1] = blocks[1][:, 1, 0] = self._factor * self._coupled
+
+
+class InertiaTerm(MassTerm):
+    """The incremental potential of the masses, inertia/2 |q - target|^2_M."""
+
+    kinds = ("inertia",)
+
+    def pull(self, rates: Rates) -> tuple[float, np.ndarray]:
+        """Mass times acceleration."""
+        return rates.inertia, rates.target

@@ -77,7 +77,11 @@ class _Batch:
         )
         membrane = stiffness if panels.membrane else np.zeros_like(stiffness)
         bending = (h**2 / 3)[:, None, None] * stiffness
-        self.elastic = kernels.Elastic(membrane, abar, bbar, bending)
+        self.elastic = self.given = kernels.Elastic(membrane, abar, bbar, bending)
+
+    def refer(self, strains: np.ndarray, factor: float) -> None:
+        a, b = np.ascontiguousarray(strains[:, :3]), np.ascontiguousarray(strains[:, 3:])
+        self.elastic = kernels.Elastic(factor * self.given.C, a, b, factor * self.given.D)
 
 
 def covariant(tensor: np.ndarray, x: np.ndarray, verts: np.ndarray) -> np.ndarray:
@@ -199,20 +203,40 @@ class ShellTerm(StencilTerm):
             kernels.second_form(state.x, batch.stencil.verts, batch.s, b)
             yield batch.table.cells, batch.elastic.abar, b
 
+    def strains(self, state: State) -> Keyed:
+        """Metrics and second forms (n, 6) by input cell."""
+        forms = []
+        for batch in self.batches:
+            a = np.zeros((len(batch.t), 3))
+            kernels.metrics(state.x, batch.stencil.verts, a)
+            forms.append(a)
+        seconds = [b for _, _, b in self.second_forms(state)]
+        return self._keyed([np.hstack(pair) for pair in zip(forms, seconds, strict=True)], 6)
+
+    def refer(self, strains: np.ndarray, factor: float) -> None:
+        """Take metrics and second forms (n, 6) as stress-free, and the stiffness times a factor."""
+        for batch, part in zip(self.batches, self._split(strains), strict=True):
+            batch.refer(part, factor)
+
     def history(self) -> dict[str, Keyed]:
         """Hinge angles (n, 3) of the accepted state, by input cell."""
-        cells = [self._input_cell[batch.table.cells] for batch in self.batches]
-        angles = [batch.theta_ref for batch in self.batches]
-        none = np.empty(0, dtype=np.int64), np.empty((0, 3))
-        keys, values = np.concatenate([none[0], *cells]), np.concatenate([none[1], *angles])
-        return {"hinge_angle": Keyed(keys, values)}
+        return {"hinge_angle": self._keyed([batch.theta_ref for batch in self.batches], 3)}
 
     def restore(self, values: dict[str, np.ndarray]) -> None:
         """Unwrap hinge angles against those of an earlier run."""
-        ends = np.cumsum([len(batch.theta_ref) for batch in self.batches])
-        parts = np.split(values["hinge_angle"], ends[:-1]) if self.batches else []
-        for batch, part in zip(self.batches, parts, strict=True):
+        for batch, part in zip(self.batches, self._split(values["hinge_angle"]), strict=True):
             batch.theta_ref[:] = part
+
+    def _keyed(self, parts: list[np.ndarray], width: int) -> Keyed:
+        """Values (n, width) of the batches by input cell."""
+        cells = [self._input_cell[batch.table.cells] for batch in self.batches]
+        none = np.empty(0, dtype=np.int64), np.empty((0, width))
+        return Keyed(np.concatenate([none[0], *cells]), np.concatenate([none[1], *parts]))
+
+    def _split(self, values: np.ndarray) -> list[np.ndarray]:
+        """Values (n, ...) of each batch."""
+        ends = np.cumsum([len(batch.theta_ref) for batch in self.batches])
+        return np.split(values, ends[:-1]) if self.batches else []
 
     def largest_tilt(self, state: State) -> float:
         """Largest |tilt| (radians) of this rank's triangles."""
