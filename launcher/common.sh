@@ -12,6 +12,7 @@ common_environment() {
     export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
     export OMPI_MCA_btl=${OMPI_MCA_btl:-self,sm}
+    export OMPI_MCA_mpi_yield_when_idle=${OMPI_MCA_mpi_yield_when_idle:-1} # waiting ranks make room
     export PRTE_MCA_rmaps_default_mapping_policy=${PRTE_MCA_rmaps_default_mapping_policy:-:oversubscribe}
     case :${PYTHONPATH:-}: in
         *:"$repo":*) ;;

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 MODULES = (
     *("dolfinx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "numba", "scipy", "matplotlib"),
-    *("h5py", "pyvista", "tqdm", "pytest"),
+    *("h5py", "pyvista", "tqdm", "pytest", "xdist"),
 )
 OLDEST = (0, 9)
 OLDEST_PYTHON = (3, 11)

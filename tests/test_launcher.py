@@ -64,8 +64,8 @@ def clone(tmp_path):
 
 
 def test_demo_gets_its_arguments_and_ranks(clone):
-    script = "import sys; from mpi4py import MPI\n"
-    script += "print(MPI.COMM_WORLD.size, sys.argv[1:], flush=True)"
+    script = "import os, sys; from mpi4py import MPI\n"
+    script += "os.write(1, f'{MPI.COMM_WORLD.size} {sys.argv[1:]}\\n'.encode())"
     (clone / "demos" / "hello.py").write_text(script)
     assert call(clone / "run", "demo", "hello", "--a", "b c").stdout == "1 ['--a', 'b c']\n"
     two = call(clone / "run", "demo", "hello", "-n", "2", "-n")
