@@ -23,6 +23,8 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from ufl_origami.errors import InputError
+from ufl_origami.history import History
 from ufl_origami.motion import Motion
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.schemes import Formula, Instant, combination
@@ -155,3 +157,27 @@ class EnergyBook:
                 lost, given = lost + share + drive, given + drive
         lost, given = configuration.sum([lost, given])
         return float(lost), float(given)
+
+
+def energy_changes(history: History) -> dict[str, np.ndarray]:
+    """Energies (n,) by kind, potential ones counted from the start as `EnergyBook.reach` does.
+
+    Raises:
+        InputError: the history has no energy book.
+    """
+    if "imbalance" not in history.columns:
+        raise InputError("the history has no energy book: record a motion with energies")
+    kinds = [c.removeprefix("energy_") for c in history.columns if c.startswith("energy_")]
+    changes = {kind: history[f"energy_{kind}"] for kind in kinds if kind != "total"}
+    return {k: v if k == "kinetic" else v - v[0] for k, v in changes.items()}
+
+
+def balance_error(history: History) -> float:
+    """Largest imbalance of a motion over its largest energy; 0 where there is no energy.
+
+    Raises:
+        InputError: the history has no energy book.
+    """
+    scale = max(float(np.abs(values).max()) for values in energy_changes(history).values())
+    worst = float(np.abs(history["imbalance"]).max())
+    return worst / scale if worst > 0 else 0.0

@@ -48,7 +48,13 @@ def coefficient(label: str, value: float) -> None:
 
 
 class FrictionLaw(ABC):
-    """Traction that slows sliding, the derivative of a convex potential in the velocity."""
+    """Traction that slows sliding, the derivative of a convex potential in the velocity.
+
+    Attributes:
+        couples_nodes: whether it has directions that the sheet carries.
+    """
+
+    couples_nodes: bool = False
 
     @abstractmethod
     def potential(self, slip: Expr, number: Number, carry: Carry) -> Expr:
@@ -132,6 +138,11 @@ class Anisotropic(FrictionLaw):
         positive("friction: larger coefficient", max(self.mu_along, self.mu_across))
         positive("friction: eps", self.eps)
 
+    @property
+    def couples_nodes(self) -> bool:  # type: ignore[override]
+        """Whether the direction is carried by the sheet."""
+        return self.direction.carried
+
     def potential(self, slip: Expr, number: Number, carry: Carry) -> Expr:
         """Potential of the weighted speed."""
         largest, eps = number(max(self.mu_along, self.mu_across)), number(self.eps)
@@ -161,6 +172,11 @@ class OneWay(FrictionLaw):
         """Refuse a negative coefficient or a speed that is not positive."""
         coefficient("friction: mu", self.mu)
         positive("friction: eps", self.eps)
+
+    @property
+    def couples_nodes(self) -> bool:  # type: ignore[override]
+        """Whether the direction is carried by the sheet."""
+        return self.direction.carried
 
     def potential(self, slip: Expr, number: Number, carry: Carry) -> Expr:
         """Potential of the speed along the direction."""

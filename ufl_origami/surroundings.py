@@ -20,7 +20,7 @@ from ufl_origami.terms.base import Term
 from ufl_origami.terms.contact import ContactTerm, Surface, touch
 from ufl_origami.terms.damping import MassDamping, ViscousFold, ViscousShell
 from ufl_origami.terms.form import SheetFunctions
-from ufl_origami.terms.friction import FrictionTerm
+from ufl_origami.terms.friction import friction_term
 from ufl_origami.terms.inertia import Mass, mass_matrix
 from ufl_origami.terms.magnetic import MagneticTerm
 
@@ -103,8 +103,7 @@ def surrounding_terms(
     terms += magnetic_terms(scene, functions, factor)
     contacts = {spec.name: contact_term(spec, configuration, functions) for spec in scene.obstacles}
     frictions: list[Term] = [
-        FrictionTerm(
-            functions,
+        friction_term(
             contacts[spec.obstacle],
             spec.law,
             touching(configuration, functions, spec.on) * contacts[spec.obstacle].at.share.x.array,

@@ -8,6 +8,7 @@ from ufl_origami.plotting.charts import (
     profile_chart,
 )
 from ufl_origami.plotting.display import DisplayError, virtual_display
+from ufl_origami.plotting.energy_book import energy_book_chart
 from ufl_origami.plotting.stills import Look, Sheet, film, still
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "Series",
     "Sheet",
     "convergence_chart",
+    "energy_book_chart",
     "film",
     "fold_angle_chart",
     "history_chart",

@@ -16,8 +16,8 @@ from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.errors import ContactWarning, SolveError
 from ufl_origami.obstacles import Obstacle
-from ufl_origami.terms.base import MatrixTerm
-from ufl_origami.terms.form import FormTerm, SheetFunctions
+from ufl_origami.terms.base import StencilTerm
+from ufl_origami.terms.form import NodalFormTerm, SheetFunctions
 from ufl_origami.terms.gaps import Gaps
 
 CLOSED = 1e-6
@@ -76,7 +76,7 @@ def touch(functions: SheetFunctions, surface: Surface, nodes: np.ndarray) -> Tou
     return Touch(surface, gaps, share, functions.number(surface.motion(0.0)))
 
 
-class ContactTerm(MatrixTerm):
+class ContactTerm(StencilTerm):
     """Barrier between the sheet and one obstacle.
 
     Args:
@@ -101,7 +101,8 @@ class ContactTerm(MatrixTerm):
             number(barrier.stiffness),
             number(barrier.distance),
         )
-        self._form = FormTerm("contact", functions, energy=at.share * density * functions.nodal())
+        nodes, energy = at.share.x.array, at.share * density * functions.nodal()
+        self._form = NodalFormTerm(nodes, "contact", functions, energy=energy)
         self.smallest = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
         self._seen: tuple[np.ndarray, float] | None = None
@@ -126,7 +127,10 @@ class ContactTerm(MatrixTerm):
 
     def gap(self, state: State) -> float:
         """Smallest distance of this rank's nodes, inf without any."""
-        return float(self.at.gaps.at(self._relative(state.q, self._place)).min(initial=np.inf))
+        here = self._relative(state.q, self._place)
+        if self._seen is None or not np.array_equal(here, self._seen[0]):
+            self._seen = here, float(self.at.gaps.at(here).min(initial=np.inf))
+        return self._seen[1]
 
     def near(self, state: State) -> bool:
         """Whether a node of this rank is within the barrier's reach, or may be.
@@ -134,13 +138,13 @@ class ContactTerm(MatrixTerm):
         A distance changes by no more than its node moves: as long as no node has come far enough
         since they were last measured, they are not measured again.
         """
-        here, reach = self._relative(state.q, self._place), self.at.surface.barrier.distance
+        reach = self.at.surface.barrier.distance
         if self._seen is not None:
+            here = self._relative(state.q, self._place)
             moved = np.linalg.norm(here - self._seen[0], axis=1).max(initial=0.0)
             if self._seen[1] - moved > reach:
                 return False
-        self._seen = here, float(self.at.gaps.at(here).min(initial=np.inf))
-        return self._seen[1] <= reach
+        return self.gap(state) <= reach
 
     def energies(self, state: State) -> np.ndarray:
         """Energy of this rank's nodes."""
@@ -155,10 +159,15 @@ class ContactTerm(MatrixTerm):
         if self.near(state):
             self._form.add_residual(state, out)
 
-    def add_tangent(self, state: State, matrix) -> None:
-        """Add the barrier's stiffness."""
+    def stencils(self) -> list[np.ndarray]:
+        """The nodes that can touch."""
+        return self._form.stencils()
+
+    def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
+        """Write the barrier's stiffness."""
+        blocks[0][:] = 0.0
         if self.near(state):
-            self._form.add_tangent(state, matrix)
+            self._form.tangent(state, blocks)
 
     def longest_step(self, state: State, step: np.ndarray) -> float:
         """Part of a step that leaves a tenth of every gap.

@@ -14,7 +14,7 @@ from ufl.domain import extract_unique_domain
 from ufl_origami import compat
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.sheet import SheetMesh
-from ufl_origami.terms.base import MatrixTerm
+from ufl_origami.terms.base import MatrixTerm, StencilTerm, Term
 
 JIT_OPTIONS = {"timeout": 300}
 
@@ -117,8 +117,8 @@ def pushed_forward(u: fem.Function, vector):
     return ufl.dot(current, ufl.dot(ufl.inv(metric), ufl.dot(jacobian.T, vector)))
 
 
-class FormTerm(MatrixTerm):
-    """A UFL energy or force on the displacement.
+class FormSum(Term):
+    """Energy and force of a UFL functional of the displacement; how it is linearised is left open.
 
     Args:
         kind: name under which the energy is booked.
@@ -137,16 +137,10 @@ class FormTerm(MatrixTerm):
         self.kinds = (kind,)
         self.conservative = self.symmetric = energy is not None
         self.functions = functions
-        residual = force if energy is None else ufl.derivative(energy, functions.u)
+        self.linear_form = force if energy is None else ufl.derivative(energy, functions.u)
         self._given = energy, force
-        self._energy = None if energy is None else self._compile(energy)
-        self._residual = self._compile(residual)
-        tangent = ufl.algorithms.expand_derivatives(ufl.derivative(residual, functions.u))
-        self._tangent = None if tangent.empty() else self._compile(tangent)
-
-    @staticmethod
-    def _compile(form) -> fem.Form:
-        return fem.form(form, jit_options=JIT_OPTIONS)
+        self._energy = None if energy is None else compiled(energy)
+        self._residual = compiled(self.linear_form)
 
     def energies(self, state: State) -> np.ndarray:
         """This rank's share of the functional; zero for a force without energy."""
@@ -161,8 +155,8 @@ class FormTerm(MatrixTerm):
         energy, force = self._given
         direction = self.functions.field()
         if energy is None:
-            return direction, self._compile(ufl.action(force, direction))
-        return direction, self._compile(ufl.derivative(energy, self.functions.u, direction))
+            return direction, compiled(ufl.action(force, direction))
+        return direction, compiled(ufl.derivative(energy, self.functions.u, direction))
 
     def slope(self, state: State, step: np.ndarray) -> np.ndarray:
         """Derivative of the energy along a step (minus the force's work) by a form of its own."""
@@ -174,9 +168,29 @@ class FormTerm(MatrixTerm):
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the assembled linear form to the displacement part of the local values."""
         self.functions.set(state)
-        part = np.zeros(len(self.functions.dofs))
-        compat.add_vector(self._residual, part)
-        out[self.functions.dofs] += part
+        out[self.functions.dofs] += assembled(self._residual, len(self.functions.dofs))
+
+
+def compiled(form) -> fem.Form:
+    """A form, compiled with the time that it needs."""
+    return fem.form(form, jit_options=JIT_OPTIONS)
+
+
+def assembled(form: fem.Form, size: int) -> np.ndarray:
+    """This rank's share (size,) of a linear form."""
+    out = np.zeros(size)
+    compat.add_vector(form, out)
+    return out
+
+
+class FormTerm(FormSum, MatrixTerm):
+    """A UFL energy or force on the displacement; see `FormSum` for the arguments."""
+
+    def __init__(self, kind: str, functions: SheetFunctions, energy=None, force=None):
+        super().__init__(kind, functions, energy, force)
+        derivative = ufl.derivative(self.linear_form, functions.u)
+        tangent = ufl.algorithms.expand_derivatives(derivative)
+        self._tangent = None if tangent.empty() else compiled(tangent)
 
     def add_tangent(self, state: State, matrix) -> None:
         """Add the assembled derivative of the linear form; nothing for a linear energy."""
@@ -188,3 +202,40 @@ class FormTerm(MatrixTerm):
             matrix.setLGMap(self.functions.lgmap, self.functions.lgmap)
         compat.add_matrix(self._tangent, matrix)
         matrix.setLGMap(*usual)
+
+
+class NodalFormTerm(FormSum, StencilTerm):
+    """A UFL energy or force that is a sum over nodes, each felt by one node alone.
+
+    Its form is integrated by `SheetFunctions.nodal`. The tangent is then a block for each node,
+    whose columns are the derivatives in three directions: vectors, ten times cheaper than a matrix.
+
+    Args:
+        nodes: (nd,) whether each node of the displacement's space takes part.
+        kind, functions, energy, force: see `FormSum`.
+    """
+
+    def __init__(
+        self, nodes: np.ndarray, kind: str, functions: SheetFunctions, energy=None, force=None
+    ):
+        super().__init__(kind, functions, energy, force)
+        self._nodes = functions.dofs.reshape(-1, 3)[nodes.astype(bool)]
+        self._places = np.flatnonzero(nodes)
+        self._directions = [functions.field() for _ in range(3)]
+        for axis, direction in enumerate(self._directions):
+            direction.x.array[axis::3] = 1.0
+        self._columns = [
+            compiled(ufl.derivative(self.linear_form, functions.u, direction))
+            for direction in self._directions
+        ]
+
+    def stencils(self) -> list[np.ndarray]:
+        """The nodes' displacements."""
+        return [self._nodes.astype(np.int32)]
+
+    def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
+        """Write the derivative of each node's force."""
+        self.functions.set(state)
+        for axis, column in enumerate(self._columns):
+            values = assembled(column, len(self.functions.dofs)).reshape(-1, 3)
+            blocks[0][:, :, axis] = values[self._places]

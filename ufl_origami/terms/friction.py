@@ -17,9 +17,15 @@ from ufl_origami.barrier import barrier_pressure
 from ufl_origami.configuration import State
 from ufl_origami.friction_laws import Direction, FrictionLaw
 from ufl_origami.obstacles import length
-from ufl_origami.terms.base import MatrixTerm, Rates
+from ufl_origami.terms.base import MatrixTerm, Rates, StencilTerm, Term
 from ufl_origami.terms.contact import ContactTerm
-from ufl_origami.terms.form import FormTerm, SheetFunctions, pushed_forward
+from ufl_origami.terms.form import (
+    FormSum,
+    FormTerm,
+    NodalFormTerm,
+    SheetFunctions,
+    pushed_forward,
+)
 
 
 @dataclass(frozen=True)
@@ -40,66 +46,99 @@ class Sliding:
     belt: fem.Constant
     before: fem.Constant
 
+    @classmethod
+    def create(cls, functions: SheetFunctions) -> "Sliding":
+        """At rest."""
+        belt, before = functions.number(np.zeros(3)), functions.number(np.zeros(3))
+        return cls(functions.number(1.0), functions.field(), functions.field(), belt, before)
 
-class FrictionTerm(MatrixTerm):
+
+@dataclass(frozen=True)
+class FrictionForm:
+    """What a friction law comes to for one obstacle.
+
+    Attributes:
+        contact: the obstacle's contact.
+        sliding: functions of the step under way.
+        lagged: whether pressure and normal are those of the last accepted state.
+        integrand: potential per rest area (lagged), or minus the traction paired with a test
+            function.
+    """
+
+    contact: ContactTerm
+    sliding: Sliding
+    lagged: bool
+    integrand: Expr
+
+    @property
+    def argument(self) -> dict[str, ufl.Form]:
+        """The form under the name by which a term takes it."""
+        dx = self.contact.functions.nodal()
+        return {"energy" if self.lagged else "force": self.integrand * dx}
+
+
+def friction_form(
+    contact: ContactTerm, law: FrictionLaw, share: np.ndarray, *, lagged: bool
+) -> FrictionForm:
+    """Friction of the nodes (nd,) with share 1."""
+    functions, at = contact.functions, contact.at
+    sliding, weight = Sliding.create(functions), fem.Function(at.share.function_space)
+    weight.x.array[:] = share
+    u, place = (sliding.last, sliding.before) if lagged else (functions.u, at.place)
+    number, barrier = functions.number, at.surface.barrier
+    x = ufl.variable(ufl.SpatialCoordinate(functions.sheet.mesh) + u - place)
+    gap = at.surface.obstacle.distance(x, number)
+    normal = ufl.diff(gap, x)
+    pressure = barrier_pressure(gap, number(barrier.stiffness), number(barrier.distance))
+    velocity = sliding.rate * (functions.u - sliding.base) - sliding.belt
+
+    def along(vector: Expr) -> Expr:
+        return vector - ufl.inner(normal, vector) * normal
+
+    def carry(direction: Direction) -> Expr:
+        vector = number(direction.vector)
+        flat = along(pushed_forward(u, vector) if direction.carried else vector)
+        return flat / length(flat)
+
+    if lagged:
+        density = law.potential(along(velocity), number, carry) / sliding.rate
+    else:
+        drag = law.drag(along(velocity), number, carry)
+        density = ufl.inner(drag, ufl.TestFunction(functions.V))
+    return FrictionForm(contact, sliding, lagged, weight * pressure * density)
+
+
+def friction_term(
+    contact: ContactTerm, law: FrictionLaw, share: np.ndarray, *, lagged: bool = False
+) -> "FrictionTerm":
     """Friction on the nodes that touch an obstacle.
 
     Args:
-        functions: the scene's shared functions.
         contact: the obstacle's contact.
         law: friction law.
         share: (nd,) 1 at the nodes that have it, else 0.
         lagged: take pressure and normal from the last accepted state.
     """
+    form, functions = friction_form(contact, law, share, lagged=lagged), contact.functions
+    if law.couples_nodes and not lagged:
+        return CoupledFriction(form, FormTerm("friction", functions, **form.argument))
+    return NodalFriction(form, NodalFormTerm(share, "friction", functions, **form.argument))
+
+
+class FrictionTerm(Term):
+    """Friction on one obstacle.
+
+    Args:
+        form: the law's form.
+        own: term of that form.
+    """
 
     kinds = ("friction",)
 
-    def __init__(
-        self,
-        functions: SheetFunctions,
-        contact: ContactTerm,
-        law: FrictionLaw,
-        share: np.ndarray,
-        *,
-        lagged: bool = False,
-    ):
-        self.functions, self.contact, self.lagged = functions, contact, lagged
-        number, zero = functions.number, functions.number(np.zeros(3))
-        self._sliding = Sliding(
-            number(1.0), functions.field(), functions.field(), zero, number(np.zeros(3))
-        )
-        self._share = fem.Function(contact.at.share.function_space)
-        self._share.x.array[:] = share
-        self._form = self._make(law)
-        self.conservative = self.symmetric = lagged
-
-    def _make(self, law: FrictionLaw) -> FormTerm:
-        functions, sliding, at = self.functions, self._sliding, self.contact.at
-        u = sliding.last if self.lagged else functions.u
-        number, surface = functions.number, at.surface
-        place = sliding.before if self.lagged else at.place
-        x = ufl.variable(ufl.SpatialCoordinate(functions.sheet.mesh) + u - place)
-        gap = surface.obstacle.distance(x, number)
-        normal = ufl.diff(gap, x)
-        stiffness, reach = number(surface.barrier.stiffness), number(surface.barrier.distance)
-        pressure = self._share * barrier_pressure(gap, stiffness, reach)
-        velocity = sliding.rate * (functions.u - sliding.base) - sliding.belt
-
-        def along(vector: Expr) -> Expr:
-            return vector - ufl.inner(normal, vector) * normal
-
-        def carry(direction: Direction) -> Expr:
-            vector = number(direction.vector)
-            flat = along(pushed_forward(u, vector) if direction.carried else vector)
-            return flat / length(flat)
-
-        slip, dx = along(velocity), functions.nodal()
-        if self.lagged:
-            potential = law.potential(slip, number, carry) / sliding.rate
-            return FormTerm("friction", functions, energy=pressure * potential * dx)
-        test = ufl.TestFunction(functions.V)
-        drag = law.drag(slip, number, carry)
-        return FormTerm("friction", functions, force=pressure * ufl.inner(drag, test) * dx)
+    def __init__(self, form: FrictionForm, own: FormSum):
+        self._form, self.contact, self._sliding = own, form.contact, form.sliding
+        self.functions, self.lagged = own.functions, form.lagged
+        self.conservative = self.symmetric = form.lagged
 
     def begin_step(self, rates: Rates) -> None:
         """Take over how velocities follow, the last state, and the obstacle's way."""
@@ -128,12 +167,38 @@ class FrictionTerm(MatrixTerm):
         self.add_residual(state, out)
         return -float(out[self.functions.dofs].reshape(-1, 3).sum(axis=0) @ way)
 
+    def acts(self, state: State) -> bool:
+        """Whether any node of this rank may have drag."""
+        return self.lagged or self.contact.near(state)
+
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the drag."""
-        if self.lagged or self.contact.near(state):
+        if self.acts(state):
             self._form.add_residual(state, out)
+
+
+class NodalFriction(FrictionTerm, StencilTerm):
+    """Friction that each node feels alone."""
+
+    _form: NodalFormTerm
+
+    def stencils(self) -> list[np.ndarray]:
+        """The nodes that can rub."""
+        return self._form.stencils()
+
+    def tangent(self, state: State, blocks: list[np.ndarray]) -> None:
+        """Write the drag's derivative."""
+        blocks[0][:] = 0.0
+        if self.acts(state):
+            self._form.tangent(state, blocks)
+
+
+class CoupledFriction(FrictionTerm, MatrixTerm):
+    """Friction along directions that the sheet carries, which neighbouring nodes turn."""
+
+    _form: FormTerm
 
     def add_tangent(self, state: State, matrix) -> None:
         """Add the drag's derivative."""
-        if self.lagged or self.contact.near(state):
+        if self.acts(state):
             self._form.add_tangent(state, matrix)

@@ -49,6 +49,7 @@ class Gaps:
         cells, corner = np.nonzero(nodes[table])
         self._nodes, first = np.unique(table[cells, corner], return_index=True)
         self._cells, self._corner = cells[first], corner[first]
+        self._all = self._grouped(slice(None))
 
     def __len__(self) -> int:
         """Number of nodes of this rank's triangles that can touch."""
@@ -67,14 +68,17 @@ class Gaps:
         """Gradients (n, 3) of the distances."""
         return self._evaluate(self._slope, nodes, some, (3,))
 
+    def _grouped(self, some) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cells of some rows, and of each row its cell's position and its corner."""
+        cells, row = np.unique(self._cells[some], return_inverse=True)
+        return cells.astype(np.int32), row, self._corner[some]
+
     def _evaluate(self, expression, nodes, some, shape) -> np.ndarray:
-        some = slice(None) if some is None else some
-        wanted, corner = self._cells[some], self._corner[some]
-        if not len(wanted):
+        cells, row, corner = self._all if some is None else self._grouped(some)
+        if not len(cells):
             return np.zeros((0, *shape))
         self._place.x.array[:] = nodes.ravel()
-        cells, row = np.unique(wanted, return_inverse=True)
-        values = expression.eval(self.functions.sheet.mesh, cells.astype(np.int32))
+        values = expression.eval(self.functions.sheet.mesh, cells)
         return values.reshape(len(cells), -1, *shape)[row, corner]
 
     def check(self, nodes: np.ndarray, label: str) -> None:
