@@ -27,6 +27,9 @@ from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
 from ufl_origami.surroundings import damping_terms, make_motion
 from ufl_origami.terms.base import Term
 
+REUSE = 0.1
+"""Default of `NewtonSettings.reuse` in time: the first tangent of a step mostly serves its end."""
+
 JUMP = 1e-9
 """Distance over the sheet's largest coordinate by which prescribed motion may start off."""
 
@@ -77,7 +80,8 @@ def solve_dynamic(
         output: folder for history, fields and checkpoint (what an earlier run left there is
             replaced unless this run resumes it); None keeps the history in memory only.
         record: what history and fields hold.
-        newton: method and tolerances of one step.
+        newton: method and tolerances of one step; default: as in statics, but that a factorisation
+            serves again where an iteration leaves less than a tenth of the residual.
         resume: continue the run in `output` from its last accepted step, on any number of ranks;
             on one rank, with the settings it had, to the same bits.
         progress: show a progress bar; None: where the error stream is a terminal.
@@ -101,7 +105,8 @@ def solve_dynamic(
         raise InputError("resume: name the output folder of the run to resume")
     model = scene if isinstance(scene, Model) else build(scene)
     record = record or Record()
-    run = _start(model, time, find_scheme(scheme), newton or NewtonSettings(), record)
+    settings = newton or NewtonSettings(reuse=REUSE)
+    run = _start(model, time, find_scheme(scheme), settings, record)
     log, steps = Log(model, record, run), []
     with ExitStack() as stack:
         disk = None

@@ -53,6 +53,8 @@ class NewtonSettings:
             with the guard from its first step.
         cycles: runs of the watchdog, each with twice the line-search steps of the one before.
         floor: tolerance floor in units of eps max K_ii max |x|.
+        reuse: share of the residual to which an iteration must reduce it for the next one to keep
+            its factorisation (modified Newton within one solve); 0: factor at each iteration.
         prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
         options: PETSc options under that prefix; those in the database already win.
     """
@@ -63,6 +65,7 @@ class NewtonSettings:
     patience: int = 2
     cycles: int = 4
     floor: float = 30.0
+    reuse: float = 0.0
     prefix: str = "ufl_origami_"
     options: Mapping[str, object] = field(default_factory=dict)
 
@@ -163,6 +166,9 @@ class NewtonSolver:
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix, _) -> None:
         """Tangent at an iterate, factored and shifted where the guard asks for it."""
+        if self._serves(snes):
+            x.copy(self._previous)
+            return
         self.problem.linearise(self._previous if self._mip else None, x)
         self.problem.stiffness(x)
         self._floor = min(self._floor or np.inf, self._round_off(x))
@@ -174,6 +180,11 @@ class NewtonSolver:
         if self._previous is None:
             self._previous = x.duplicate()
         x.copy(self._previous)
+
+    def _serves(self, snes: PETSc.SNES) -> bool:
+        """Whether the factorisation of the iteration before serves once more."""
+        norms = self.report.residuals
+        return snes.getIterationNumber() > 0 and norms[-1] < self.settings.reuse * norms[-2]
 
     def set_floor(self, x: PETSc.Vec) -> None:
         """Take the tolerance floor from the tangent just assembled at an accepted state.

@@ -114,7 +114,8 @@ class ContactTerm(StencilTerm):
             SceneError: on all ranks.
         """
         with together(self.configuration.comm):
-            self.at.gaps.check(self._relative(state.q, self._place), self.at.surface.label)
+            here = self._relative(state.q, self._place)
+            self.at.gaps.check(here, self._place, self.at.surface.label)
 
     def set_time(self, time: float) -> None:
         """Move the obstacle to its place at a time."""

@@ -81,8 +81,13 @@ class Gaps:
         values = expression.eval(self.functions.sheet.mesh, cells)
         return values.reshape(len(cells), -1, *shape)[row, corner]
 
-    def check(self, nodes: np.ndarray, label: str) -> None:
+    def check(self, nodes: np.ndarray, shift: np.ndarray, label: str) -> None:
         """Refuse a start inside the obstacle, or a function that is no distance.
+
+        Args:
+            nodes: displacements (nd, 3) in the obstacle's frame.
+            shift: (3,) displacement of the obstacle.
+            label: how the message calls it.
 
         Raises:
             SceneError: on this rank; the message tells where.
@@ -95,7 +100,8 @@ class Gaps:
             raise SceneError(f"{label}: gradient of length {steep:.4g} is that of no distance")
         if (distance <= 0).any():
             deepest = self._nodes[distance.argmin()]
-            place = self.functions.V.tabulate_dof_coordinates()[deepest] + nodes[deepest]
+            rest = self.functions.V.tabulate_dof_coordinates()[deepest]
+            place = rest + nodes[deepest] + shift
             where = ", ".join(f"{value:.4g}" for value in place)
             raise SceneError(
                 f"{label}: the sheet starts {-distance.min():.3g} inside, at ({where})"
