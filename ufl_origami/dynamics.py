@@ -27,8 +27,8 @@ from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
 from ufl_origami.surroundings import damping_terms, make_motion
 from ufl_origami.terms.base import Term
 
-REUSE = 0.1
-"""Default of `NewtonSettings.reuse` in time: the first tangent of a step mostly serves its end."""
+REUSE = 3.0
+"""Default of `NewtonSettings.reuse` in time: a step's first tangent mostly serves to its end."""
 
 JUMP = 1e-9
 """Distance over the sheet's largest coordinate by which prescribed motion may start off."""
@@ -81,7 +81,7 @@ def solve_dynamic(
             replaced unless this run resumes it); None keeps the history in memory only.
         record: what history and fields hold.
         newton: method and tolerances of one step; default: as in statics, but that a factorisation
-            serves again where an iteration leaves less than a tenth of the residual.
+            is kept where it will do the rest of a step in three more iterations.
         resume: continue the run in `output` from its last accepted step, on any number of ranks;
             on one rank, with the settings it had, to the same bits.
         progress: show a progress bar; None: where the error stream is a terminal.

@@ -60,7 +60,7 @@ class TimeSettings:
     step: float
     fixed: bool = False
     tolerance: float = 1e-3
-    energy_tolerance: float = 1e-3
+    energy_tolerance: float = 1e-2
     smallest: float | None = None
     largest: float | None = None
     growth: float = 1.5
@@ -242,10 +242,10 @@ class TimePath:
         """One accepted step towards a stop, cut as often as needed."""
         begin, tries = clock.perf_counter(), []
         target, now = self._target(stop), self.past[0].time
+        size, least = target - now, self.settings.least
         while True:
             tried = self._try(x, target)
             tries.append(tried.report)
-            size, least = target - now, self.settings.least
             smaller = self._smaller(tried, size)
             if smaller is None or (not tried.why and size <= least):
                 break
@@ -253,7 +253,8 @@ class TimePath:
             if self.settings.fixed or size <= least:
                 self._give_up(why)
             log.info("step to %g failed (%s), cut to %g", target, why, smaller)
-            target = now + max(smaller, least)
+            size = max(smaller, least)  # target - now differs from it by round-off
+            target = now + size
         if smaller is not None:
             text = f"step to {target:g}: errors of {tried.excess:.2g} times the tolerance at the"
             warnings.warn(f"{text} smallest step {size:g}", AccuracyWarning, stacklevel=3)
@@ -282,10 +283,11 @@ class TimePath:
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
 
     def _give_up(self, why: str) -> None:
-        time = self.past[0].time
+        time, settings = self.past[0].time, self.settings
         self.problem.set_time(time)
-        kind = "fixed step" if self.settings.fixed else "step of the smallest size"
-        raise SolveError(f"{kind} {self.settings.step:g} failed: {why}", time)
+        kind = "fixed step" if settings.fixed else "step of the smallest size"
+        size = settings.step if settings.fixed else settings.least
+        raise SolveError(f"{kind} {size:g} failed: {why}", time)
 
     def _smaller(self, tried: _Try, size: float) -> float | None:
         """Step to be tried instead, or None where the tried one is good."""

@@ -53,8 +53,9 @@ class NewtonSettings:
             with the guard from its first step.
         cycles: runs of the watchdog, each with twice the line-search steps of the one before.
         floor: tolerance floor in units of eps max K_ii max |x|.
-        reuse: share of the residual to which an iteration must reduce it for the next one to keep
-            its factorisation (modified Newton within one solve); 0: factor at each iteration.
+        reuse: iterations that the last factorisation may still need, judged by how it reduced the
+            residual last, to be kept for them (modified Newton within one solve); 0: factor at each
+            iteration.
         prefix: PETSc option prefix; every option of SNES, KSP and PC is reachable through it.
         options: PETSc options under that prefix; those in the database already win.
     """
@@ -182,9 +183,15 @@ class NewtonSolver:
         x.copy(self._previous)
 
     def _serves(self, snes: PETSc.SNES) -> bool:
-        """Whether the factorisation of the iteration before serves once more."""
-        norms = self.report.residuals
-        return snes.getIterationNumber() > 0 and norms[-1] < self.settings.reuse * norms[-2]
+        """Whether the factorisation of the iteration before serves to the end."""
+        if not self.settings.reuse or snes.getIterationNumber() == 0:
+            return False
+        before, now = self.report.residuals[-2:]
+        return now < before and now * (now / before) ** self.settings.reuse < self._tolerance()
+
+    def _tolerance(self) -> float:
+        """Residual norm at which the iteration ends."""
+        return max(self.settings.rtol * self.problem.force_scale, self._floor)
 
     def set_floor(self, x: PETSc.Vec) -> None:
         """Take the tolerance floor from the tangent just assembled at an accepted state.
@@ -243,7 +250,7 @@ class NewtonSolver:
         self.report.residuals.append(norm)
         if not np.isfinite(norm):
             return reason.DIVERGED_FNORM_NAN
-        if norm <= max(self.settings.rtol * self.problem.force_scale, self._floor):
+        if norm <= self._tolerance():
             return reason.CONVERGED_FNORM_RELATIVE
         return reason.CONVERGED_ITERATING
 
