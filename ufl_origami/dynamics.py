@@ -27,6 +27,9 @@ from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
 from ufl_origami.surroundings import damping_terms, make_motion
 from ufl_origami.terms.base import Term
 
+ITERATIONS = 20
+"""Default of `NewtonSettings.iterations` in time: a cut wastes all those of a step."""
+
 REUSE = 3.0
 """Default of `NewtonSettings.reuse` in time: a step's first tangent mostly serves to its end."""
 
@@ -80,8 +83,8 @@ def solve_dynamic(
         output: folder for history, fields and checkpoint (what an earlier run left there is
             replaced unless this run resumes it); None keeps the history in memory only.
         record: what history and fields hold.
-        newton: method and tolerances of one step; default: as in statics, but that a factorisation
-            is kept where it will do the rest of a step in three more iterations.
+        newton: method and tolerances of one step; default: as in statics, but 20 full steps, and a
+            factorisation that will do the rest of a step in three more iterations is kept.
         resume: continue the run in `output` from its last accepted step, on any number of ranks;
             on one rank, with the settings it had, to the same bits.
         progress: show a progress bar; None: where the error stream is a terminal.
@@ -105,7 +108,7 @@ def solve_dynamic(
         raise InputError("resume: name the output folder of the run to resume")
     model = scene if isinstance(scene, Model) else build(scene)
     record = record or Record()
-    settings = newton or NewtonSettings(reuse=REUSE)
+    settings = newton or NewtonSettings(iterations=ITERATIONS, reuse=REUSE)
     run = _start(model, time, find_scheme(scheme), settings, record)
     log, steps = Log(model, record, run), []
     with ExitStack() as stack:

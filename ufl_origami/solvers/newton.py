@@ -32,6 +32,15 @@ SHIFT_FACTOR = 8.0
 SHIFT_TRIES = 40
 """Shifts that the guard tries at one tangent."""
 
+CYCLE = 4
+"""Iterations after which one that has not reduced the residual counts as part of a cycle."""
+
+STAGNANT = 0.5
+"""Share of the residual two iterations before, above which it counts as not reduced."""
+
+CRITICAL = 5
+"""Residuals evaluated along the step of an iteration that is part of a cycle."""
+
 MANY = 1e4
 """Unknowns above which the tolerance floor grows with the root of their number."""
 
@@ -113,6 +122,7 @@ class NewtonSolver:
         self.report = NewtonReport()
         self.allowed = 0
         self.pivots: int | None = None
+        self._first = 0  # residual of the run under way
         self._residual_vector = problem.configuration.create_vector()
         self._previous: PETSc.Vec | None = None
         self._mip = self._guard = self.settings.method == "default"
@@ -157,13 +167,50 @@ class NewtonSolver:
         self.problem.residual(x, out)
 
     def _stop_before_bounds(self, x: PETSc.Vec, step: PETSc.Vec) -> bool:
-        """Shorten a Newton step (SNES goes to x - step) that a barrier would not survive."""
+        """Shorten a Newton step (SNES goes to x - step) that a barrier would not survive.
+
+        Where iterates jump to and fro across the bend of a friction law, the step also ends where
+        the residual is normal to it (a critical point of the energy along the step, if there is
+        one).
+        """
         ahead = step.copy()
         ahead.scale(-1.0)
         part = self.problem.longest_step(x, ahead)
-        if part < 1.0:
-            step.scale(part)
+        if self._cycles():
+            part *= self._critical_part(x, ahead, part)
+        ahead.scale(-part)
+        ahead.copy(step)
         return part < 1.0
+
+    def _critical_part(self, x: PETSc.Vec, step: PETSc.Vec, longest: float) -> float:
+        """Part of the longest step where the residual is normal to it, by regula falsi."""
+        trial, residual = x.duplicate(), self._residual_vector
+
+        def slope(part: float) -> float:
+            x.copy(trial)
+            trial.axpy(part * longest, step)
+            self.problem.residual(trial, residual)
+            return residual.dot(step)
+
+        low, high = 0.0, 1.0
+        below, above = slope(low), slope(high)
+        if not below < 0 < above:
+            return 1.0
+        for _ in range(CRITICAL):
+            middle = low + (high - low) * min(max(below / (below - above), 0.1), 0.9)
+            value = slope(middle)
+            if abs(value) < 0.1 * -below:
+                break
+            if value < 0:
+                low, below = middle, value
+            else:
+                high, above = middle, value
+        return middle
+
+    def _cycles(self) -> bool:
+        """Whether the residual once did not fall over two iterations, the first ones left out."""
+        norms = np.array(self.report.residuals[self._first :])
+        return bool((norms[CYCLE:] > STAGNANT * norms[CYCLE - 2 : -2]).any())
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix, _) -> None:
         """Tangent at an iterate, factored and shifted where the guard asks for it."""
@@ -256,6 +303,7 @@ class NewtonSolver:
 
     def _run(self, snes: PETSc.SNES, x: PETSc.Vec, iterations: int) -> bool:
         snes.setTolerances(max_it=iterations)
+        self._first = len(self.report.residuals)
         try:
             snes.solve(None, x)
         except PETSc.Error as error:  # PETSc wraps what its callbacks raise
