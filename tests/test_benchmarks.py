@@ -45,6 +45,20 @@ def test_newton_iteration(tmp_path):
         assert row["iteration s"] == pytest.approx(sum(row[stage] for stage in stages))
 
 
+@pytest.mark.serial
+def test_time_step(tmp_path):
+    rows = {row["scene"]: row for row in rows_of("time_step.py", tmp_path)}
+    for row in rows.values():
+        assert row["dofs"] == pytest.approx(1_000, rel=0.2)
+        assert row["assembly %"] + row["factor %"] + row["rest %"] == pytest.approx(100)
+        kinds = [row[f"{kind} %"] for kind in ("gravity", "contact", "friction", "magnetic")]
+        assert row["surroundings %"] == pytest.approx(sum(kinds))
+        assert 0 < row["book %"] < 50
+    assert rows["free"]["surroundings %"] == 0
+    assert min(rows["all, implicit"][f"{kind} %"] for kind in ("contact", "friction")) > 0
+    assert rows["gravity"]["contact %"] == rows["contact"]["friction %"] == 0
+
+
 def twin_and_others(rows):
     """Errors w and u in percent of the fem model, and of each other formulation by its name."""
     errors = {row["formulation"]: (abs(row["w %"]), abs(row["u %"])) for row in rows}

@@ -8,11 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ufl_origami as uo
 from ufl_origami import demo
 from ufl_origami.scene import Scene
+from ufl_origami.scene_surroundings import Surroundings
+from ufl_origami.solvers.dynamics import TimeSettings
 from ufl_origami.solvers.newton import NewtonSettings
 from ufl_origami.solvers.static import StepSettings
 
@@ -20,7 +23,13 @@ pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md"))]
 README = DOCUMENTS[0].read_text()
-EXAMPLES = {"my_scene.py", "foundation.py", "test_foundation.py", "ufl_origami/terms/foundation.py"}
+EXAMPLES = {
+    "my_scene.py",
+    "my_motion.py",
+    "foundation.py",
+    "test_foundation.py",
+    "ufl_origami/terms/foundation.py",
+}
 EXAMPLES |= {"tests/test_foundation.py", "demos/NAME.py"}
 each_document = pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 
@@ -44,7 +53,7 @@ def run(*arguments, folder, path=()):
 
 
 def test_first_scene_runs_and_agrees_with_the_elastica(tmp_path, monkeypatch, capsys):
-    (code,) = blocks(DOCUMENTS[0])
+    code, _ = blocks(DOCUMENTS[0])
     assert len(code.splitlines()) <= 20
     monkeypatch.chdir(tmp_path)
     names = {}
@@ -58,6 +67,24 @@ def test_first_scene_runs_and_agrees_with_the_elastica(tmp_path, monkeypatch, ca
     assert (tmp_path / "output/first_scene/history.csv").exists()
     assert f"{exact.included_angle_deg:.3f}" in README
     assert "elastica at 1:" in capsys.readouterr().out
+
+
+def test_first_motion_runs_and_its_energy_book_is_balanced(tmp_path, monkeypatch, capsys):
+    _, code = blocks(DOCUMENTS[0])
+    assert len(code.splitlines()) <= 20
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(code, "README.md", "exec"), names)
+    history, contact = names["result"].history, names["result"].model.contacts[0]
+    assert history["time"][-1] == 0.2
+    losses = {way: history[f"lost_{way}"] for way in ("damping", "friction", "integrator")}
+    for way in ("damping", "friction"):
+        assert np.diff(losses[way]).min() > -1e-3 * losses[way][-1]
+    assert min(loss[-1] for loss in losses.values()) > 1e-3
+    scale = np.abs(history["energy_gravity"]).max()
+    assert np.abs(history["imbalance"]).max() < 1e-8 * scale
+    assert 0 < contact.smallest < contact.at.surface.barrier.distance
+    assert "smallest gap:" in capsys.readouterr().out
 
 
 def test_example_of_an_own_term_runs_as_it_stands(tmp_path):
@@ -122,23 +149,36 @@ def test_public_names_of_the_readme_exist():
 
 def test_methods_of_the_scene_in_the_readme_exist():
     (sentence,) = re.findall(r"`Scene` has also (.*?);", README, re.DOTALL)
-    methods = set(re.findall(r"`(\w+)`", sentence))
+    (around,) = re.findall(r"- Around the sheet: (.*?)\.", README, re.DOTALL)
+    methods = set(re.findall(r"`(\w+)`", sentence + around))
     used = set(re.findall(r"scene\.(\w+)\(", README))
-    public = {n for n in vars(Scene) if not n.startswith("_")}
+    public = {n for n in vars(Scene) | vars(Surroundings) if not n.startswith("_")}
     public -= {field.name for field in dataclasses.fields(Scene)} | {"panel_material"}
     assert methods | used == public
 
 
-@pytest.mark.parametrize("settings", [NewtonSettings, StepSettings])
-def test_settings_in_the_document_are_those_of_the_code(settings):
-    text = (ROOT / "docs/solver.md").read_text()
-    table = text.split(f"| `{settings.__name__}` |")[1].split("\n\n")[0]
+SETTINGS = {
+    "solver.md": (NewtonSettings(), StepSettings()),
+    "time.md": (TimeSettings(step=1.0),),
+}
+
+
+@pytest.mark.parametrize(
+    ("document", "settings"),
+    [(document, one) for document, some in SETTINGS.items() for one in some],
+    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
+)
+def test_settings_in_the_document_are_those_of_the_code(document, settings):
+    text = (ROOT / "docs" / document).read_text()
+    table = text.split(f"| `{type(settings).__name__}` |")[1].split("\n\n")[0]
     rows = re.findall(r"^\| `(\w+)` \| ([^|]+) \|", table, re.MULTILINE)
     documented = {name: value.strip("`\"' ") for name, value in rows}
-    default = vars(settings())
+    default = vars(settings)
     assert set(documented) == set(default)
     for name, value in default.items():
-        if isinstance(value, float | int):
+        if value is None or name == "step":
+            assert not documented[name][0].isdigit(), name  # told in words
+        elif isinstance(value, float | int) and not isinstance(value, bool):
             assert float(documented[name]) == pytest.approx(value, rel=1e-12), name
         else:
             assert documented[name] == str(value), name
