@@ -163,6 +163,8 @@ class FrictionTerm(Term):
         """Work that the moving obstacle does on this rank's nodes."""
         motion = self.contact.at.surface.motion
         way = np.asarray(motion(state.time), dtype=float) - motion(since)
+        if not way.any():
+            return 0.0
         out = np.zeros(len(state.q))
         self.add_residual(state, out)
         return -float(out[self.functions.dofs].reshape(-1, 3).sum(axis=0) @ way)
