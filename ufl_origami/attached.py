@@ -27,6 +27,10 @@ LARGEST_EXPONENT = 100.0
 EXACT = 1e-9
 """Relative error of the moments that is round-off."""
 
+NEAR, POLISH = 1e-4, 3
+"""Relative error below which Newton's steps end the search, and their number: the search itself
+gives up where the round-off of the dual hides that it still falls."""
+
 
 def spread_body(comm: MPI.Comm, rest: np.ndarray, spec: MassSpec) -> np.ndarray:
     """Masses (n,) of this rank's owned nodes (n, 3) of a place; collective.
@@ -86,5 +90,7 @@ def _entropic(comm: MPI.Comm, basis: np.ndarray, wanted: np.ndarray, count: int)
     found = optimize.minimize(
         dual, start, method="trust-exact", jac=gradient, hess=hessian, options=options
     )
-    exact = np.abs(gradient(found.x)).max() <= EXACT
-    return masses(found.x) if exact else None
+    y = found.x
+    for _ in range(POLISH if np.abs(gradient(y)).max() < NEAR else 0):
+        y = y - np.linalg.lstsq(hessian(y), gradient(y), rcond=None)[0]
+    return masses(y) if np.abs(gradient(y)).max() <= EXACT else None

@@ -20,6 +20,7 @@ from mpi4py import MPI
 from ufl_origami.errors import InputError
 from ufl_origami.meshing import STRUCTURES
 from ufl_origami.scene import MODELS
+from ufl_origami.solvers.schemes import SCHEMES
 from ufl_origami.stencils import BENDING_FORMS
 
 Defaults = Mapping[str, Any]
@@ -53,10 +54,13 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "h": {"type": number(0.0), "help": "thickness over panel width"},
     "size": {"type": number(0.0), "help": "length of the triangles' sides over panel width"},
     "mesh": {"choices": STRUCTURES, "help": "kind of mesh"},
+    "turns": {"type": number(0.0), "help": "turns of the field"},
     "problem": {"nargs": "+", "help": "problems to solve, one or several"},
     "method": {"nargs": "+", "help": "discretisations to compare, one or several"},
     "scene": {"nargs": "+", "metavar": "NAME", "help": "scenes by name, one or several"},
     "tighten": {"type": number(0.0), "help": "number by which all tolerances are divided"},
+    "scheme": {"choices": tuple(SCHEMES), "help": "time integrator"},
+    "dt": {"type": number(0.0), "help": "fixed time step in seconds; None: steps adapt"},
 }
 
 
@@ -113,8 +117,9 @@ def _parse(name, description, defaults, quick, argv) -> argparse.Namespace:
     parser.add_argument(
         "--output", type=Path, metavar="DIR", help=f"folder of results (default: {folder})"
     )
-    text = ", ".join(f"{key} {_words(value)}" for key, value in quick.items())
-    parser.add_argument("--quick", action="store_true", help=f"one short case: {text}")
+    replaced = ", ".join(f"{key} {_words(value)}" for key, value in quick.items())
+    text = f"a short run: {replaced}" if replaced else "a short run"
+    parser.add_argument("--quick", action="store_true", help=text)
     given = vars(parser.parse_args(argv))
     base = {"output": folder, "quick": False, **defaults, **(quick if "quick" in given else {})}
     chosen = {key: _like(value, base[key]) for key, value in given.items()}

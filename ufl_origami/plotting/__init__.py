@@ -6,9 +6,11 @@ from ufl_origami.plotting.charts import (
     fold_angle_chart,
     history_chart,
     profile_chart,
+    stacked_chart,
 )
 from ufl_origami.plotting.display import DisplayError, virtual_display
 from ufl_origami.plotting.energy_book import energy_book_chart
+from ufl_origami.plotting.settling import settling_chart
 from ufl_origami.plotting.stills import Look, Sheet, film, still
 
 __all__ = [
@@ -22,6 +24,8 @@ __all__ = [
     "fold_angle_chart",
     "history_chart",
     "profile_chart",
+    "settling_chart",
+    "stacked_chart",
     "still",
     "virtual_display",
 ]

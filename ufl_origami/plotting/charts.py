@@ -190,6 +190,35 @@ def history_chart(
     return path
 
 
+def stacked_chart(
+    rows: Mapping[str, Sequence[Series]],
+    file: str | Path,
+    *,
+    abscissa: str,
+    heights: Sequence[float] | None = None,
+) -> Path:
+    """Charts over one abscissa, one above the other; a label has one colour in all of them.
+
+    Args:
+        rows: name of the ordinate (with unit) -> its curves.
+        file: file to write.
+        abscissa: name of the abscissa, with unit.
+        heights: relative heights of the rows, default equal.
+    """
+    every = [series for group in rows.values() for series in group]
+    if not every:
+        raise InputError(f"chart {Path(file).name}: nothing to draw")
+    with _figure(file, (6.2, 1.2 + 1.9 * len(rows))) as (figure, path):
+        charts = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=heights)
+        for axes, (ordinate, group) in zip(charts[:, 0], rows.items(), strict=True):
+            _draw(axes, group, every)
+            axes.set_ylabel(ordinate)
+        charts[-1, 0].set_xlabel(abscissa)
+        figure.align_ylabels(charts[:, 0])
+        _legend(figure, list(charts[:, 0]))
+    return path
+
+
 def convergence_chart(
     series: Sequence[Series],
     file: str | Path,

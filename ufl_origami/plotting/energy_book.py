@@ -1,6 +1,8 @@
 """Chart of an energy book: where energy is, what came in and went out, what does not add up."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from math import floor, log10
 from pathlib import Path
 from typing import Literal
 
@@ -21,8 +23,8 @@ _WAYS = {
     "friction": ("lost: friction", 1),
 }  # fmt: skip
 _NAMES = "energy{},\npotential from start", "work and losses{}"
-_NOTHING = 1e-12
-"""Part of the largest energy below which a curve is round-off."""
+_NOTHING = 1e-4
+"""Part of the largest energy below which a curve would lie on the axis."""
 
 
 def energy_book_chart(
@@ -35,7 +37,7 @@ def energy_book_chart(
 ) -> Path:
     """Energy book of a motion: energies by kind, work and losses, imbalance, over time.
 
-    Potential energies count from the start, and curves that are nothing but round-off are left out.
+    Potential energies count from the start, and curves that would lie on the axis are left out.
     The imbalance is shown over the largest energy, so that its largest value is
     `energy_book.balance_error`.
 
@@ -55,17 +57,14 @@ def energy_book_chart(
     scale = max(float(np.abs(values).max()) for values in changes.values())
     if scale == 0:
         raise InputError(f"chart {Path(file).name}: there is no energy to draw")
-    upper = _energies(time, changes, scale)
-    middle = [
-        Series(time, values, label, colour=colour)
-        for name, (label, colour) in _WAYS.items()
-        if _counts(values := history[f"lost_{name}" if name in LOSSES else name], scale)
-    ]
-    unit = f" ({energy_unit})" if energy_unit else ""
+    power, unit = _unit(scale, energy_unit)
+    exchanged = {name: history[f"lost_{name}" if name in LOSSES else name] for name in _WAYS}
+    charts = _energies(time, changes, scale), _exchanges(time, exchanged, scale)
     with _figure(file, (6.6, 5.6)) as (figure, path):
         rows = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.4, 1.0))
-        for axes, series, name in zip(rows, (upper, middle), _NAMES, strict=False):
-            _draw(axes, series, series)
+        for axes, series, name in zip(rows, charts, _NAMES, strict=False):
+            scaled = [replace(one, y=np.asarray(one.y) / 10.0**power) for one in series]
+            _draw(axes, scaled, scaled)
             axes.axhline(0.0, color="#777777", lw=0.7, zorder=0.5)
             axes.set_ylabel(name.format(unit))
             if series:
@@ -77,6 +76,19 @@ def energy_book_chart(
             rows[0].set_title(title, loc="left")
         figure.align_ylabels(rows)
     return path
+
+
+def _unit(scale: float, unit: str) -> tuple[int, str]:
+    """Power of ten taken out of very small and very large energies, and the unit's text."""
+    power = 0 if 0.1 <= scale < 1e4 else 3 * floor(log10(scale) / 3)
+    text = f"$10^{{{power}}}$ {unit}".strip() if power else unit
+    return power, f" ({text})" if text else ""
+
+
+def _exchanges(time: NDArray, values: Mapping[str, NDArray], scale: float) -> list[Series]:
+    """Curves of work and losses, those that there are."""
+    there = [name for name in _WAYS if _counts(values[name], scale)]
+    return [Series(time, values[name], _WAYS[name][0], colour=_WAYS[name][1]) for name in there]
 
 
 def _counts(values: NDArray, scale: float) -> bool:

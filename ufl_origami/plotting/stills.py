@@ -21,6 +21,7 @@ from ufl_origami.errors import InputError
 from ufl_origami.plotting.display import virtual_display
 
 _FRONT, _BACK, _INK = "#9fc3de", "#e8c9a0", "#2b2b2b"
+_OBSTACLE, _OBSTACLE_LINE = "#e3e3df", "#b4b4ae"
 _OVERSAMPLING = 2  # rendered larger and reduced: smooth lines on any renderer
 _FILM_FORMATS = {".gif": "GIF", ".webp": "WEBP", ".png": "PNG"}
 
@@ -69,6 +70,7 @@ class Look:
         scale_label: unit behind the number of the scale bar; None leaves the bar out.
         edges: draw the triangles' edges.
         size: pixels, width and height.
+        obstacles: surfaces drawn grey in each picture, their `crease_edges` as thin lines.
     """
 
     camera: tuple[float, float] = (-20.0, 30.0)
@@ -79,6 +81,7 @@ class Look:
     scale_label: str | None = ""
     edges: bool = True
     size: tuple[int, int] = (1200, 900)
+    obstacles: Sequence[Sheet] = ()
 
 
 def still(
@@ -150,7 +153,7 @@ class _View:
 
     @classmethod
     def of(cls, sheets: Sequence[Sheet], look: Look) -> "_View":
-        """View of every sheet, with margins for title, scale bar and colour bar."""
+        """View of all sheets and obstacles, with margins for title, scale bar and colour bar."""
         azimuth, elevation = map(radians, look.camera)
         towards = np.array(
             [sin(azimuth) * cos(elevation), -cos(azimuth) * cos(elevation), sin(elevation)]
@@ -158,7 +161,8 @@ class _View:
         right = np.array([cos(azimuth), sin(azimuth), 0.0])
         up = np.cross(towards, right)
         axes = np.array([right, up, towards])
-        seen = np.concatenate([np.asarray(sheet.points, float) for sheet in sheets]) @ axes.T
+        shown = [np.asarray(one.points, float) for one in (*sheets, *look.obstacles)]
+        seen = np.concatenate(shown) @ axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
         size = float(np.max(high - low)) / 2
         if size == 0:
@@ -209,8 +213,11 @@ def _render(sheets: Sequence[Sheet], look: Look) -> list[Any]:
             plotter.set_background("white")
             _light(pv, plotter, view)
             for sheet in sheets:
+                plotter.suppress_rendering = True  # else every change would be rendered
                 plotter.clear_actors()
                 _draw(pv, plotter, sheet, look, view)
+                plotter.suppress_rendering = False
+                plotter.render()
                 images.append(_annotate(plotter.screenshot(return_img=True), look, view))
         finally:
             plotter.close()  # before the X server stops: VTK exits when it loses its server
@@ -236,25 +243,35 @@ def _light(pv, plotter, view: _View) -> None:
 
 
 def _draw(pv, plotter, sheet: Sheet, look: Look, view: _View) -> None:
-    """Surface, border, creases and camera."""
-    mesh = pv.PolyData.from_regular_faces(
-        np.asarray(sheet.points, float), np.asarray(sheet.triangles)
-    )
+    """Obstacles; surface, border and creases of the sheet; camera."""
+    for body in look.obstacles:
+        plotter.add_mesh(_mesh(pv, body), color=_OBSTACLE, ambient=0.75, diffuse=0.3)
+        _draw_lines(plotter, _crease_lines(pv, body), 0.002 * view.size, _OBSTACLE_LINE)
+    mesh = _mesh(pv, sheet)
     _draw_surface(plotter, mesh, sheet, look, view)
     border = mesh.extract_feature_edges(
         boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
     _draw_lines(plotter, border, 0.0025 * view.size, "#555555")
-    if sheet.crease_edges is not None and len(np.asarray(sheet.crease_edges)):
-        pairs = np.asarray(sheet.crease_edges)
-        lines = np.column_stack([np.full(len(pairs), 2), pairs]).ravel()
-        _draw_lines(plotter, pv.PolyData(mesh.points, lines=lines), 0.006 * view.size, _INK)
+    _draw_lines(plotter, _crease_lines(pv, sheet), 0.006 * view.size, _INK)
     camera = plotter.camera
     camera.position = view.centre + 20 * view.size * view.towards
     camera.focal_point, camera.up = view.centre, view.up
     plotter.enable_parallel_projection()
     camera.parallel_scale = view.half[1]
     plotter.reset_camera_clipping_range()
+
+
+def _mesh(pv, sheet: Sheet) -> Any:
+    points, triangles = np.asarray(sheet.points, float), np.asarray(sheet.triangles)
+    return pv.PolyData.from_regular_faces(points, triangles)
+
+
+def _crease_lines(pv, sheet: Sheet) -> Any:
+    edges = () if sheet.crease_edges is None else sheet.crease_edges
+    pairs = np.asarray(edges, int).reshape(-1, 2)
+    lines = np.column_stack([np.full(len(pairs), 2), pairs]).ravel()
+    return pv.PolyData(np.asarray(sheet.points, float), lines=lines)
 
 
 def _draw_surface(plotter, mesh, sheet: Sheet, look: Look, view: _View) -> None:
@@ -280,7 +297,7 @@ def _draw_surface(plotter, mesh, sheet: Sheet, look: Look, view: _View) -> None:
 
 def _draw_lines(plotter, lines, radius: float, colour: str) -> None:
     """Tubes round line segments: visible from both sides, without flicker on the surface."""
-    if lines.n_points:
+    if lines.n_lines:
         plotter.add_mesh(lines.tube(radius=radius), color=colour, ambient=0.6, diffuse=0.4)
 
 
