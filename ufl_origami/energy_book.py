@@ -127,9 +127,14 @@ class EnergyBook:
         self.scale = max(self.scale, self.reach(account))
 
     def reach(self, account: Account) -> float:
-        """Largest energy of an account, potential ones counted from the start."""
-        moved = (value - self._first[kind] for kind, value in account.energies.items())
-        return max(account.kinetic, *map(abs, moved))
+        """Largest energy of an account, potential ones counted from the start.
+
+        A hundredth of those themselves counts, too: a start from rest has no other scale.
+        """
+        kinds = account.energies.items()
+        moved = max((abs(value - self._first[kind]) for kind, value in kinds), default=0.0)
+        whole = max((abs(value) for _, value in kinds), default=0.0)
+        return max(account.kinetic, moved, 0.01 * whole)
 
     def loss(self, account: Account) -> float:
         """What the integrator took or gave in the step to an account, over the largest energy."""

@@ -65,6 +65,8 @@ class Record:
         extra: further columns: name -> function of the model (collective), giving a number.
         fields: "vtx", "xdmf", "auto" (VTX where dolfinx has it) or "none".
         every: time between written fields; 0: each accepted step.
+        checkpoint: seconds between checkpoints, which short steps are not worth; the last step of a
+            run has one however it ends, unless the process is killed.
     """
 
     energies: bool = True
@@ -74,6 +76,7 @@ class Record:
     extra: Mapping[str, Callable[[Model], float]] = field(default_factory=dict)
     fields: str = "auto"
     every: float = 0.0
+    checkpoint: float = 0.0
 
 
 def step_row(step: Step) -> Row:

@@ -9,6 +9,7 @@ In the output folder:
 """
 
 import sys
+import time as clock
 from collections.abc import Sequence
 from math import floor
 from pathlib import Path
@@ -91,7 +92,8 @@ class Disk:
         self._checkpoint = Checkpoint(log.model, folder / CHECKPOINT_FOLDER, log.run.terms)
         self._csv: CsvFile | None = None
         self._fields: FieldWriter | None = None
-        self._written = 0.0
+        self._written = self._saved = 0.0
+        self._unsaved = False
 
     def begin(self) -> None:
         """Start afresh: an earlier run's history, fields and checkpoint are replaced."""
@@ -139,7 +141,10 @@ class Disk:
         on_rank0(self.comm, lambda: file.write(row) if file else None)
         if self._fields and self._due():
             self._fields.write()
-        self._save()
+        self._unsaved = True
+        late = clock.monotonic() - self._saved >= self.log.record.checkpoint
+        if self.comm.bcast(late, root=0):
+            self._save()
 
     def _due(self) -> bool:
         """Whether fields are to be written: each time a multiple of `Record.every` is passed."""
@@ -149,13 +154,14 @@ class Disk:
 
     def _save(self) -> None:
         self._checkpoint.write(self.run.rows, self.run.memory(), self.run.vectors())
+        self._saved, self._unsaved = clock.monotonic(), False
 
     def __enter__(self) -> "Disk":
         """Files are opened by `begin` or `resume`."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Close the files.
+        """Write the last checkpoint and close the files.
 
         Fields are closed by all ranks together: not after an error that one rank may have alone,
         which waiting for the others would hide.
@@ -163,6 +169,8 @@ class Disk:
         if self._csv:
             self._csv.close()
         together = kind is None or issubclass(kind, COLLECTIVE_ERRORS) or self.comm.size == 1
+        if self._unsaved and together:
+            self._save()
         if self._fields and together:
             self._fields.close()
 
