@@ -7,9 +7,10 @@ loads, friction) and c the prescribed unknowns,
 
     work        Pi(q0, t1) - Pi(q0, t0): what moves in time (loads, fields, obstacles, rest
                 angles); reactions . dq_c; r . dq; what friction takes from moving obstacles
-    damping     damping force . dq
+    damping     mass: force . dq; stiffness: viscous stress . change of strain
     friction    friction force . (dq - the obstacle's way)
     integrator  dq . M a1 - (T1 - T0)  +  Pi(q0, t1) - Pi(q1, t1) + dPi(q1, t1) . dq
+                + viscous stress . (strain of the chord dq - change of strain)
 
 The integrator's share follows from its own formula: the kinetic part from positions and rates
 alone (for implicit Euler it is |v1 - v0|^2_M / 2), the potential part from energies alone, dPi
@@ -116,8 +117,9 @@ class EnergyBook:
         work += self.physical.work(new.q, way) + self._reactions(new, way)
         losses = {**account.losses, "integrator": account.losses["integrator"] + inertial + bregman}
         for kind in ("damping", "friction"):
-            taken, given = self._dissipated(kind, new, way, old.time)
+            taken, given, chord = self._dissipated(kind, new, way, old.time)
             losses[kind] += taken
+            losses["integrator"] += chord
             work += given
         return Account(energies, kinetic, account.start, account.work + work, losses)
 
@@ -151,17 +153,16 @@ class EnergyBook:
         share = float(np.dot(self._forces.array_r[dofs], way.array_r[dofs]))
         return float(self.whole.configuration.sum(share))
 
-    def _dissipated(self, kind: str, new: Instant, way, since: float) -> tuple[float, float]:
-        """Energy that the terms of one kind took over a step, and what moving bodies gave them."""
+    def _dissipated(self, kind: str, new: Instant, way, since: float) -> tuple[float, ...]:
+        """Heat of the terms of one kind over a step, what moving bodies gave, and the chord's."""
         state, configuration = self.whole.state(new.q), self.whole.configuration
-        step, lost, given = configuration.to_local(way), 0.0, 0.0
+        step, lost, given, chord = configuration.to_local(way), 0.0, 0.0, 0.0
         for term in self.whole.terms:
             if term.kinds == (kind,):
-                share = float(term.slope(state, step).sum())
-                drive = term.drive(state, since)
-                lost, given = lost + share + drive, given + drive
-        lost, given = configuration.sum([lost, given])
-        return float(lost), float(given)
+                heat, drive = term.heat(state, step), term.drive(state, since)
+                lost, given = lost + heat + drive, given + drive
+                chord += float(term.slope(state, step).sum()) - heat
+        return tuple(map(float, configuration.sum([lost, given, chord])))
 
 
 def energy_changes(history: History) -> dict[str, np.ndarray]:

@@ -76,8 +76,11 @@ class Log:
         return self.run.columns() | self._recorder.measure()
 
     def observe(self) -> None:
-        """Add a row, that of rank 0 (whose clock counts)."""
-        self.history.rows.append(self.model.sheet.comm.bcast(self.row(), root=0))
+        """Add a row, that of rank 0 (whose clock counts), under names that all rows share."""
+        row = self.row()
+        values = self.model.sheet.comm.bcast(list(row.values()), root=0)
+        names = self.history.columns or tuple(row)
+        self.history.rows.append(dict(zip(names, values, strict=True)))
 
 
 class Disk:

@@ -184,7 +184,7 @@ class TimePath:
     def __post_init__(self) -> None:
         """Measure the sheet, to which local errors refer."""
         self._length = sheet_size(self.problem)
-        self._mass = self._norm2(self._ones())
+        self._mass = self._norm2(self._ones()) / 3  # of the three components
 
     def _ones(self) -> PETSc.Vec:
         ones = self.past[0].q.duplicate()
@@ -336,7 +336,8 @@ class TimePath:
         if self.book:
             account = self.book.draft(self.past[0], new, formula)
             loss = self.book.loss(account) / settings.energy_tolerance
-            if self.number and loss > 0:  # the first step is Euler's, which halves any start
+            slows = self._norm2(new.v) < self._norm2(self.past[0].v)
+            if loss > 0 and (self.number or slows):  # Euler's first step halves what is set off
                 excess = max(excess, loss)
                 factor = min(factor, SAFETY * loss ** (-0.5 / order))
         return _Try(new, self.newton.report, account, error, excess, factor, "")

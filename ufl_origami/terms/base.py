@@ -109,6 +109,10 @@ class Term(ABC):
             return np.array([out @ step])
         return central_slope(lambda part: self.energies(state.moved(part * step)))
 
+    def heat(self, state: State, step: np.ndarray) -> float:
+        """What this rank's force takes over a step that ends in a state and turns into heat."""
+        return float(self.slope(state, step).sum())
+
     def drive(self, state: State, since: float) -> float:
         """Work done on the sheet by bodies that moved since a time, through this rank's force.
 
@@ -147,7 +151,7 @@ class Term(ABC):
         """Take back the values of `history`, in the order of the keys that it gives now."""
 
 
-def central_slope(function: Callable[[float], np.ndarray], width: float = 1 / 16) -> np.ndarray:
+def central_slope(function: Callable[[float], np.ndarray], width: float = 1 / 32) -> np.ndarray:
     """Derivative at 0 by central differences of order six, exact for polynomials of degree six.
 
     The energies of straight triangles are quartic along a step but for their angles.

@@ -121,11 +121,12 @@ class ViscousShell(StencilTerm):
         self._elastic, self.beta = elastic, beta
         start = elastic.strains(state)
         self._keys, self._past = start.keys, memory * [start.values]
+        self._reference = start.values, 0.0
 
     def begin_step(self, rates: Rates) -> None:
         """Refer the strains to those of the last states."""
-        base = _mean(rates.weights, self._past)
-        self._elastic.refer(base, self.beta * rates.rate)
+        self._reference = _mean(rates.weights, self._past), self.beta * rates.rate
+        self._elastic.refer(*self._reference)
 
     def set_time(self, time: float) -> None:
         """Set prescribed normals."""
@@ -134,6 +135,18 @@ class ViscousShell(StencilTerm):
     def energies(self, state: State) -> np.ndarray:
         """Dissipation potential of this rank's elements."""
         return self._elastic.energies(state).sum(keepdims=True)
+
+    def heat(self, state: State, step: np.ndarray) -> float:
+        """Viscous stress times the change of strain, from energies (quadratic in the strains).
+
+        The force's work along the step differs by the strain of its chord, which rigid rotation
+        has, too: that part belongs to the integrator.
+        """
+        ends = self.energies(state) - self.energies(state.moved(-step))
+        self._elastic.refer(self._past[0], self._reference[1])
+        change = self.energies(state)
+        self._elastic.refer(*self._reference)
+        return float((ends + change).sum())
 
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the viscous forces."""

@@ -1,0 +1,208 @@
+"""Runs in time: stopped and resumed, on several ranks, continued."""
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from time_scenes import ALONE, LANDING, PLAIN, SHARP, fixed, free_square, landing, momenta, strip
+
+import ufl_origami as uo
+
+STOPS = (0.12, 0.25)
+
+
+@pytest.fixture
+def folder(comm, tmp_path):
+    """One folder for all ranks."""
+    return Path(comm.bcast(str(tmp_path), root=0))
+
+
+def land(comm, output=None, model="ddg", **options):
+    options = {"record": PLAIN, "newton": SHARP} | options
+    return uo.solve_dynamic(landing(comm, model), STOPS, LANDING, output=output, **options)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """The uninterrupted landing, run by each rank alone."""
+    return land(ALONE)
+
+
+def stop_at(number):
+    """Ctrl-C while a step is accepted."""
+
+    def stop(step, _):
+        if step.number == number:
+            raise KeyboardInterrupt
+
+    return stop
+
+
+def bits(history):
+    """Rows without the one column that no two runs share."""
+    return [{k: v for k, v in row.items() if k != "seconds"} for row in history.rows]
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("model", ["ddg", pytest.param("fem", marks=pytest.mark.slow)])
+def test_resumed_run_equals_the_uninterrupted_one_bit_for_bit(folder, whole, model):
+    """Stopped after its first step, when BDF2 has one state to go on from, and in contact."""
+    whole = whole if model == "ddg" else land(ALONE, model=model)
+    assert whole.history["energy_contact"][3] > 0
+    for number in (1, 3):
+        part = folder / str(number)
+        with pytest.raises(KeyboardInterrupt):
+            land(ALONE, part, model, on_accept=stop_at(number))
+        assert len(uo.read_history(part / "history.csv")) == number + 1
+        resumed = land(ALONE, part, model, resume=True)
+        assert resumed.steps[0].number == number + 1
+        assert bits(resumed.history) == bits(whole.history)
+        assert bits(uo.read_history(part / "history.csv")) == bits(whole.history)
+        for ours, reference in (
+            (resumed.model.x, whole.model.x),
+            (resumed.model.motion.v, whole.model.motion.v),
+        ):
+            assert (ours.array_r == reference.array_r).all()
+
+
+@pytest.mark.serial
+def test_rare_checkpoints_hold_the_last_step_of_a_stopped_run(folder, whole):
+    rare = dataclasses.replace(PLAIN, checkpoint=1e9)
+    with pytest.raises(KeyboardInterrupt):
+        land(ALONE, folder, on_accept=stop_at(3), record=rare)
+    assert len(list((folder / "checkpoint").glob("*.npz"))) == 1
+    resumed = land(ALONE, folder, resume=True, record=rare)
+    assert resumed.steps[0].number == 4
+    assert bits(resumed.history) == bits(whole.history)
+
+
+def assert_close(history, reference, tolerance):
+    """Energies relative to the largest of them, positions to the sheet's size of 1."""
+    assert history.columns == reference.columns
+    assert len(history) == len(reference)
+    for column in reference.columns:
+        if column.startswith(("time", "position", "included")):
+            assert history[column] == pytest.approx(reference[column], abs=tolerance), column
+        if column.startswith(("energy", "work", "lost")):
+            scale = reference["energy_kinetic"].max()
+            assert history[column] == pytest.approx(reference[column], abs=tolerance * scale)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("serial_first", [True, False])
+def test_resume_on_another_number_of_ranks(comm, folder, whole, serial_first):
+    first, second = (ALONE, comm) if serial_first else (comm, ALONE)
+    mine = folder if comm.rank == 0 or first is comm else folder / "unused"
+    with pytest.raises(KeyboardInterrupt):
+        land(first, mine, on_accept=stop_at(4))
+    comm.Barrier()
+    if second is comm or comm.rank == 0:
+        result = land(second, folder, resume=True)
+        assert result.steps[0].number == 5
+        assert_close(result.history, whole.history, 1e-7)
+    comm.Barrier()
+
+
+def test_another_scheme_or_scene_is_not_resumed(comm, folder):
+    options = {"record": PLAIN, "output": folder}
+    uo.solve_dynamic(strip("ddg", comm), [0.1], fixed(0.1), **options)
+    with pytest.raises(uo.InputError, match="has scheme 'bdf2', not 'implicit_euler'"):
+        uo.solve_dynamic(
+            strip("ddg", comm), [0.2], fixed(0.1), scheme="implicit_euler", resume=True, **options
+        )
+    heavier = strip("ddg", comm)
+    heavier.point_mass("x1y0", 0.1)
+    with pytest.raises(uo.InputError, match="another scene"):
+        uo.solve_dynamic(heavier, [0.2], fixed(0.1), resume=True, **options)
+    with pytest.raises(uo.InputError, match="name the output folder"):
+        uo.solve_dynamic(strip("ddg", comm), [0.2], fixed(0.1), resume=True)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("model", ["ddg", "fem"])
+def test_ranks_together_and_one_rank_alone_move_alike(comm, whole, model):
+    shared = land(comm, model=model)
+    alone = whole if model == "ddg" else land(ALONE, model=model)
+    assert_close(shared.history, alone.history, 1e-7)
+    assert momenta(shared.model) == pytest.approx(momenta(alone.model), abs=1e-9)
+    sheet = alone.model.sheet
+    reference = dict(zip(sheet.input_vertex.tolist(), alone.model.state.x, strict=True))
+    for vertex, place in zip(
+        shared.model.sheet.input_vertex.tolist(), shared.model.state.x, strict=True
+    ):
+        assert place == pytest.approx(reference[vertex], abs=1e-7)
+
+
+@pytest.mark.serial
+def test_three_ranks_move_alike_too():
+    test = f"{Path(__file__)}::{test_ranks_together_and_one_rank_alone_move_alike.__name__}[ddg]"
+    command = ["mpirun", "-n", "3", sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run([*command, test], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "1 passed" in done.stdout
+
+
+def bent():
+    scene = strip("ddg")
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    scene.area_load("sheet", lambda time: (0.0, 0.0, -0.04))
+    return uo.build(scene)
+
+
+def test_a_static_result_goes_on_at_its_load_factor():
+    """In balance at a factor of 0.6, where a load that is a function acts in full, it stays."""
+    model = bent()
+    uo.solve_static(model, [0.6])
+    start = model.x.array_r.copy()
+    history = uo.solve_dynamic(model, [1.0], fixed(0.1), record=PLAIN).history
+    assert np.abs(start).max() > 0.01
+    assert model.x.array_r == pytest.approx(start, abs=1e-9)
+    assert history["energy_kinetic"].max() < 1e-12 * np.abs(history["energy_load"]).max()
+    assert history["time"][0] == 0.0
+    assert np.ptp(history["energy_load"]) < 1e-12
+    assert unlike_full_load() > 0.01
+
+
+def unlike_full_load():
+    """How far the strip moves where numbers act in full: the factor of 0.6 matters."""
+    model = bent()
+    uo.solve_dynamic(model, [1.0], fixed(0.1), record=PLAIN)
+    return np.abs(model.x.array_r).max()
+
+
+def test_release_of_a_pulled_strip():
+    """The load of a static path is gone when time starts anew: what was stored swings."""
+    scene = strip("ddg")
+    scene.line_load("x1", lambda time: (0.0, 0.0, 0.01 if time > 0.9 else 0.0))
+    model = uo.build(scene)
+    uo.solve_static(model, [1.0])
+    pulled = model.position("x1y0")[2]
+    history = uo.solve_dynamic(model, [0.8], fixed(0.02), record=PLAIN).history
+    stored = history["energy_membrane"][0] + history["energy_bending"][0]
+    assert stored == pytest.approx(0.5 * 0.25 * 0.01 * pulled, rel=1e-3)
+    assert history["energy_load"] == pytest.approx(np.zeros(41), abs=1e-15)
+    assert history["energy_kinetic"][0] == history["work"].max() == 0.0
+    # A load at the end has 97 % of its energy in the first mode (1.03 of the tip's deflection).
+    assert history["energy_kinetic"].max() == pytest.approx(stored, rel=0.05)
+    assert history["position_x1y0_z"].min() == pytest.approx(-pulled, rel=0.1)
+
+
+def test_motion_goes_on_in_a_second_call():
+    """Implicit Euler needs one state only: two calls go where one goes."""
+    options = {"scheme": "implicit_euler", "record": PLAIN}
+
+    def scene():
+        scene = free_square("ddg")
+        scene.gravity(lambda time: (0.0, 0.0, -np.cos(5 * time)))
+        scene.launch(uo.spin((0.0, 1.0, 0.0)))
+        return scene
+
+    whole = uo.solve_dynamic(scene(), [0.2, 0.5], fixed(0.05), **options)
+    first = uo.solve_dynamic(scene(), [0.2], fixed(0.05), **options)
+    second = uo.solve_dynamic(first.model, [0.5], fixed(0.05), **options)
+    assert second.history["time"] == pytest.approx(0.2 + 0.05 * np.arange(7), rel=1e-12)
+    for name in ("time", "energy_kinetic", "position_x1y0_x", "position_x1y0_z"):
+        assert second.history[name] == pytest.approx(whole.history[name][4:], rel=1e-11), name
