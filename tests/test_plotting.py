@@ -23,6 +23,7 @@ from ufl_origami.plotting import (
     fold_angle_chart,
     history_chart,
     profile_chart,
+    settling_chart,
     still,
     virtual_display,
 )
@@ -103,6 +104,8 @@ def test_one_colour_for_a_label_in_all_charts_of_a_figure(tmp_path):
         (lambda f: Series(X, X, "odd", "wavy"), "wavy"),
         (lambda f: convergence_chart([Series(X, -X, "negative")], f), "negative"),
         (lambda f: profile_chart({}, f), "nothing to draw"),
+        (lambda f: settling_chart([], 1.0, f), "curves"),
+        (lambda f: settling_chart([Series(X, X, "a")], 0.0, f), "limit other than zero"),
     ],
 )
 def test_bad_chart_input_is_named(tmp_path, draw, named):
@@ -115,6 +118,19 @@ def test_missing_history_column_is_named(tmp_path):
     (tmp_path / "h.csv").write_text("t,force\n0,1\n1,2\n")
     with pytest.raises(InputError, match=r"energy.*force"):
         history_chart(tmp_path / "h.csv", tmp_path / "h.png", x="t", y={"J": ["energy"]})
+
+
+def test_settling_chart_shows_value_and_distance_from_the_limit(tmp_path):
+    time = np.linspace(0.0, 10.0, 101)
+    speed = Series(time, 2.0 + np.exp(-time), "speed")
+    options = {"limit_label": "creep", "tolerance": 0.02, "labels": ("t", "v (m/s)")}
+    text = settling_chart([speed], 2.0, tmp_path / "s.svg", **options).read_text()
+    assert all(f">{word}<" in text for word in ("creep", "2 %", "v (m/s)", "t"))
+    curves = [line for line in text.splitlines() if "stroke: #0072b2" in line]
+    assert len(curves) == 2
+    assert_drawn(settling_chart([speed], 2.0, tmp_path / "s.png"), 1200)
+    there = Series(time, np.where(time < 5, 3.0, 2.0), "there")
+    assert_drawn(settling_chart([speed, there], 2.0, tmp_path / "t.png"), 1200)
 
 
 # --- pictures
@@ -183,6 +199,30 @@ def test_film_has_its_frames_in_one_view(tmp_path):
     assert top[0] > top[1] + 10 > top[2] + 20  # the ridge rises
     foot = [frame[int(0.9 * SMALL[1]) :] for frame in frames]
     assert np.mean(np.abs(foot[0] - foot[2])) < 2  # the scale bar stays
+
+
+def test_an_obstacle_is_drawn_below_the_sheet_with_its_lines(tmp_path):
+    """Seen from above: a grey square of 2 x 2 around a sheet of 1 x 1, one line across it."""
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    triangles = [[0, 1, 2], [0, 2, 3]]
+    ground = np.column_stack([2 * corners - 0.5, np.full(4, -0.1)])
+    sheet = np.column_stack([corners, np.zeros(4)])
+    images = []
+    for lines in ([], [[0, 2]]):
+        look = Look(
+            camera=(0.0, 90.0),
+            size=(600, 450),
+            edges=False,
+            scale_label=None,
+            obstacles=[Sheet(ground, triangles, crease_edges=np.array(lines, int).reshape(-1, 2))],
+        )
+        images.append(pixels(still(sheet, triangles, tmp_path / "s.png", look=look)))
+    shown = np.any(images[0] < 250, axis=2)
+    coloured = np.ptp(images[0], axis=2) > 30  # the sheet; the obstacle is grey
+    assert np.count_nonzero(shown) / np.count_nonzero(coloured) == pytest.approx(4.0, rel=0.05)
+    changed = np.any(np.abs(images[0] - images[1]) > 10, axis=2)
+    assert np.ptp(np.nonzero(changed)[1]) == pytest.approx(np.ptp(np.nonzero(shown)[1]), rel=0.05)
+    assert not np.any(changed & coloured)  # the sheet hides the line's middle
 
 
 @pytest.mark.parametrize(

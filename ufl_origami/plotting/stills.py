@@ -336,15 +336,8 @@ def _draw_scale(axes, look: Look, view: _View) -> None:
     x, y = -0.92 * view.half[0], -0.9 * view.half[1]
     axes.plot([x, x + length], [y, y], color=_INK, lw=2.5, solid_capstyle="butt")
     text = f"{length:g} {look.scale_label}".strip()
-    axes.annotate(
-        text,
-        (x + length, y),
-        xytext=(7, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=10.5,
-        color=_INK,
-    )
+    style = {"va": "center", "fontsize": 10.5, "color": _INK}
+    axes.annotate(text, (x + length, y), xytext=(7, 0), textcoords="offset points", **style)
 
 
 def _round_length(length: float) -> float:

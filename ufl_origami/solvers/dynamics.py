@@ -60,7 +60,7 @@ class TimeSettings:
     step: float
     fixed: bool = False
     tolerance: float = 1e-3
-    energy_tolerance: float = 1e-2
+    energy_tolerance: float = 3e-3
     smallest: float | None = None
     largest: float | None = None
     growth: float = 1.5
