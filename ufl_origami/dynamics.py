@@ -245,6 +245,8 @@ class _Run:
         """
         past = self.path.past
         vectors = {"rate": past[0].v}
+        if self.book:
+            vectors["reaction"] = self.book.reactions
         for age in range(1, self.path.scheme.memory):
             state = past[min(age, len(past) - 1)]
             vectors |= {f"before{age}": state.q, f"before{age}.rate": state.v}
@@ -282,6 +284,7 @@ class _Run:
         path.problem.set_time(memory["time"])
         if self.book and memory["book"]:
             self.book.recall(memory["book"])
+            vectors["reaction"].copy(self.book.reactions)
         self.step = TimeStep(**memory["last"])
         if self.model.motion:
             path.past[0].v.copy(self.model.motion.v)

@@ -1,22 +1,26 @@
 """Energy book of a motion: where energy is, what came in, what was lost, and what does not add up.
 
 Between the states 0 and 1 of a step, with dq = q1 - q0, r the forces that no energy has (follower
-loads, friction) and c the prescribed unknowns,
+loads), R those of the supports, means being those of the values at both ends,
 
-    T1 - T0 + Pi(q1, t1) - Pi(q0, t0) = work - dissipation + imbalance
+    T1 - T0 + Pi1 - Pi0 = work - losses + imbalance
 
-    work        Pi(q0, t1) - Pi(q0, t0): what moves in time (loads, fields, obstacles, rest
-                angles); reactions . dq_c; r . dq; what friction takes from moving obstacles
+    work        what moves in time: the mean of Pi(q, t1) - Pi(q, t0) over q0 and q1 (loads, fields,
+                rest angles); mean push . way of obstacles; mean r . dq; mean R . dq; what moving
+                obstacles give through friction
     damping     mass: force . dq; stiffness: viscous stress . change of strain
     friction    friction force . (dq - the obstacle's way)
-    integrator  dq . M a1 - (T1 - T0)  +  Pi(q0, t1) - Pi(q1, t1) + dPi(q1, t1) . dq
+    integrator  dq . M a1 - (T1 - T0)
+                + Pi0 + work in time - Pi1 + dPi(q1, t1) . dq
+                + (mean r - r1) . dq + (mean R - R1) . dq
                 + viscous stress . (strain of the chord dq - change of strain)
 
 The integrator's share follows from its own formula: the kinetic part from positions and rates
 alone (for implicit Euler it is |v1 - v0|^2_M / 2), the potential part from energies alone, dPi
-along the step included (`Term.slope`). No force enters it. So the imbalance is the residual of the
-equations of motion along the step, with forces taken from the energies: it vanishes to the solver's
-tolerance, and does not where a force is not the gradient of its energy.
+along the step included (`Term.slope`); without loads that change it is theirs of a step with
+constant ones. No elastic force enters it. So the imbalance is the residual of the equations of
+motion along the step, with forces taken from the energies: it vanishes to the solver's tolerance,
+and does not where a force is not the gradient of its energy.
 """
 
 from collections.abc import Mapping
@@ -86,36 +90,47 @@ class EnergyBook:
     Attributes:
         account: after the last accepted step.
         scale: largest energy so far, see `reach`.
+        reactions: forces of the supports at the end of the last step in which they moved.
     """
 
     def __init__(self, physical: Problem, whole: Problem, motion: Motion, at: Instant):
         self.physical, self.whole, self.motion = physical, whole, motion
+        self.configuration = physical.configuration
+        self._bounded = [term for term in physical.terms if term.bounded]
+        free = [term for term in physical.terms if not term.bounded]
+        self._free = Problem(physical.configuration, free, physical.constraints)
         energies, kinetic = physical.energies(at.q), motion.kinetic_energy(at.v)
         self.account = Account(energies, kinetic, kinetic + sum(energies.values()))
-        self._forces, self._first = at.q.duplicate(), energies
+        self.reactions, self._drafted = at.q.duplicate(), at.q.duplicate()
+        self._first, self._reacted = energies, False
         self.scale = kinetic
 
     def memory(self) -> dict:
         """The account and what it refers to, for a checkpoint."""
-        return {"account": asdict(self.account), "first": self._first, "scale": self.scale}
+        return {
+            "account": asdict(self.account),
+            "first": self._first,
+            "scale": self.scale,
+            "reacted": self._reacted,
+        }
 
     def recall(self, memory: Mapping) -> None:
         """Go on from the account of an earlier run."""
         self.account = Account(**memory["account"])
         self._first, self.scale = memory["first"], memory["scale"]
+        self._reacted = memory["reacted"]
 
     def draft(self, old: Instant, new: Instant, formula: Formula) -> Account:
         """The account after a step, while the terms stand at its end; collective."""
         account, way = self.account, combination((1.0, new.q), (-1.0, old.q))
-        here = self.physical.energies(old.q)
-        energies, slopes = self.physical.energies(new.q), self.physical.slopes(new.q, way)
-        bregman = sum(here[k] - energies[k] + slopes.get(k, 0.0) for k in here)
         kinetic = self.motion.kinetic_energy(new.v)
         pull = combination((formula.inertia, new.q), (-formula.inertia, formula.target))
-        inertial = self.motion.product(way, pull) - (kinetic - account.kinetic)
-        work = sum(here.values()) - sum(account.energies.values())
-        work += self.physical.work(new.q, way) + self._reactions(new, way)
-        losses = {**account.losses, "integrator": account.losses["integrator"] + inertial + bregman}
+        lost = self.motion.product(way, pull) - (kinetic - account.kinetic)
+        energies, work, share = self._potentials(old, new, way)
+        lost += share
+        for mean, last in (self._follower_work(old, new, way), self._support_work(new, way)):
+            work, lost = work + mean, lost + mean - last
+        losses = {**account.losses, "integrator": account.losses["integrator"] + lost}
         for kind in ("damping", "friction"):
             taken, given, chord = self._dissipated(kind, new, way, old.time)
             losses[kind] += taken
@@ -123,9 +138,56 @@ class EnergyBook:
             work += given
         return Account(energies, kinetic, account.start, account.work + work, losses)
 
+    def _potentials(self, old: Instant, new: Instant, way) -> tuple[dict[str, float], float, float]:
+        """Energies at the end of a step, work in time, the integrator's part of the potential."""
+        free, before = self._free, dict(self.account.energies)
+        free.set_time(old.time)
+        behind = free.energies(new.q)
+        free.set_time(new.time)
+        ahead, energies, slopes = (
+            free.energies(old.q),
+            free.energies(new.q),
+            free.slopes(new.q, way),
+        )
+        start, end = (self.configuration.state(at.q, at.time) for at in (old, new))
+        step, work, touch, slope = self.configuration.to_local(way), 0.0, 0.0, 0.0
+        for term in self._bounded:
+            work += term.carried(start, end)
+            touch, slope = touch + term.energies(end).sum(), slope + term.slope(end, step).sum()
+        work, touch, slope = map(float, self.configuration.sum([work, touch, slope]))
+        if self._bounded:
+            energies["contact"], slopes["contact"] = touch, slope
+        work += 0.5 * sum(ahead[k] - before[k] + energies[k] - behind[k] for k in ahead)
+        share = sum(before[k] - energies[k] + slopes.get(k, 0.0) for k in before)
+        return {k: energies[k] for k in before}, work, work + share
+
+    def _follower_work(self, old: Instant, new: Instant, way) -> tuple[float, float]:
+        """Work of forces without energy over a step: their mean, and those at its end."""
+        if all(term.conservative for term in self._free.terms):
+            return 0.0, 0.0
+        last = self._free.work(new.q, way)
+        self._free.set_time(old.time)
+        first = self._free.work(old.q, way)
+        self._free.set_time(new.time)
+        return 0.5 * (first + last), last
+
+    def _support_work(self, new: Instant, way) -> tuple[float, float]:
+        """Work of the supports over a step: the mean of their forces, and those at its end."""
+        dofs = self.whole.constraints.dofs
+        moved = way.array_r[dofs]
+        if not self.configuration.sum(float(np.abs(moved).sum())):
+            return 0.0, 0.0
+        self.whole.forces(new.q, self._drafted)
+        last = self._drafted.array_r[dofs] @ moved
+        first = self.reactions.array_r[dofs] @ moved if self._reacted else last
+        first, last = map(float, self.configuration.sum([first, last]))
+        return 0.5 * (first + last), last
+
     def post(self, account: Account) -> None:
         """Adopt the account of an accepted step."""
         self.account = account
+        self._drafted.copy(self.reactions)
+        self._reacted = True
         self.scale = max(self.scale, self.reach(account))
 
     def reach(self, account: Account) -> float:
@@ -144,18 +206,9 @@ class EnergyBook:
         scale = max(self.scale, self.reach(account))
         return taken / scale if taken > 0 else 0.0
 
-    def _reactions(self, new: Instant, way) -> float:
-        """Work of the supports over a step."""
-        dofs = self.whole.constraints.dofs
-        if not self.whole.configuration.sum(len(dofs)):
-            return 0.0
-        self.whole.forces(new.q, self._forces)
-        share = float(np.dot(self._forces.array_r[dofs], way.array_r[dofs]))
-        return float(self.whole.configuration.sum(share))
-
     def _dissipated(self, kind: str, new: Instant, way, since: float) -> tuple[float, ...]:
         """Heat of the terms of one kind over a step, what moving bodies gave, and the chord's."""
-        state, configuration = self.whole.state(new.q), self.whole.configuration
+        state, configuration = self.whole.state(new.q), self.configuration
         step, lost, given, chord = configuration.to_local(way), 0.0, 0.0, 0.0
         for term in self.whole.terms:
             if term.kinds == (kind,):

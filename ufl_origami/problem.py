@@ -178,6 +178,11 @@ class Problem:
         state = self.state(vector)
         return next(filter(None, [term.objection(state) for term in self.terms]), "")
 
+    def suspicions(self, vector: PETSc.Vec) -> list[str]:
+        """What may keep steps from an accepted state from converging; collective."""
+        state = self.state(vector)
+        return list(filter(None, [term.suspicion(state) for term in self.terms]))
+
     def accept(self, vector: PETSc.Vec) -> None:
         """Adopt a converged state (branches of the angles)."""
         state = self.state(vector)

@@ -122,7 +122,8 @@ class Surroundings:
             motion: function of time: displacement (3,) of the obstacle, zero at time 0 or not.
 
         Raises:
-            SceneError: the name is taken, or no place of the sheet.
+            SceneError: the name is taken, or the body is none.
+            InputError: a place that the sheet does not have.
         """
         if name in [spec.name for spec in self.obstacles]:
             raise SceneError(f"obstacle {name!r} is declared twice")
@@ -148,7 +149,8 @@ class Surroundings:
                 first order in the step.
 
         Raises:
-            SceneError: no such obstacle, or no such place.
+            SceneError: no such obstacle, or no law.
+            InputError: a place that the sheet does not have.
         """
         names = [spec.name for spec in self.obstacles]
         if obstacle not in names:

@@ -287,7 +287,8 @@ class TimePath:
         self.problem.set_time(time)
         kind = "fixed step" if settings.fixed else "step of the smallest size"
         size = settings.step if settings.fixed else settings.least
-        raise SolveError(f"{kind} {size:g} failed: {why}", time)
+        reasons = "; ".join([why, *self.problem.suspicions(self.past[0].q)])
+        raise SolveError(f"{kind} {size:g} failed: {reasons}", time)
 
     def _smaller(self, tried: _Try, size: float) -> float | None:
         """Step to be tried instead, or None where the tried one is good."""

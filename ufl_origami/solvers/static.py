@@ -193,7 +193,8 @@ class StaticPath:
             if last or size < self.settings.smallest:
                 self.problem.set_time(time)
                 smallest = f"step below the smallest size {self.settings.smallest:g}"
-                raise SolveError(f"{smallest}: {why}", time)
+                reasons = "; ".join([why, *self.problem.suspicions(x)])
+                raise SolveError(f"{smallest}: {reasons}", time)
             target, cuts = time + size, cuts + 1
             self._factor_at(x, time)
         trial.copy(x)

@@ -120,6 +120,10 @@ class Term(ABC):
         """
         return 0.0
 
+    def carried(self, old: State, new: State) -> float:
+        """Work that moving bodies do on this rank's share of a bounded energy over a step."""
+        return 0.0
+
     def longest_step(self, state: State, step: np.ndarray) -> float:
         """Part, at most 1, of a step that keeps this rank's energy well defined all the way.
 
@@ -129,6 +133,10 @@ class Term(ABC):
 
     def objection(self, state: State) -> str:
         """Why a converged state must not be accepted, or an empty string; collective."""
+        return ""
+
+    def suspicion(self, state: State) -> str:
+        """What may keep steps from an accepted state from converging, or nothing; collective."""
         return ""
 
     def largest_turn(self, state: State, step: np.ndarray) -> float:

@@ -103,7 +103,7 @@ class ContactTerm(StencilTerm):
         )
         nodes, energy = at.share.x.array, at.share * density * functions.nodal()
         self._form = NodalFormTerm(nodes, "contact", functions, energy=energy)
-        self.smallest = np.inf
+        self.smallest = self._warned = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
         self._seen: tuple[np.ndarray, float] | None = None
 
@@ -178,17 +178,44 @@ class ContactTerm(StencilTerm):
         start = self._relative(state.q, np.asarray(self.at.surface.motion(state.time)))
         return self.at.gaps.free_part(start, self._relative(state.q + step, self._place))
 
+    def carried(self, old: State, new: State) -> float:
+        """Work that the moving obstacle does over a step on this rank's nodes.
+
+        By the mean of its forces at both ends; at the end the obstacle stands where it was before.
+        """
+        way = np.asarray(self.at.surface.motion(new.time)) - self.at.surface.motion(old.time)
+        if not way.any():
+            return 0.0
+        return float(0.5 * (self._push(old) + self._push(new)) @ way)
+
+    def _push(self, state: State) -> np.ndarray:
+        """Force (3,) on this rank's nodes, the obstacle at the state's time."""
+        self.set_time(state.time)
+        out = np.zeros(len(state.q))
+        self.add_residual(state, out)
+        return -out[self.functions.dofs].reshape(-1, 3).sum(axis=0)
+
     def objection(self, state: State) -> str:
         """Refuse a gap that has closed.
 
         Raises:
             SolveError: always then, since a shorter step does not make the barrier stronger.
         """
+        if weak := self._weakness(state, CLOSED):
+            raise SolveError(weak)
+        return ""
+
+    def suspicion(self, state: State) -> str:
+        """That a gap has nearly closed: the barrier is then too steep for Newton."""
+        return self._weakness(state, NEARLY_CLOSED)
+
+    def _weakness(self, state: State, least: float) -> str:
+        """What is wrong with a barrier whose gap is no more than a share of its reach."""
         gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
         surface, reach = self.at.surface, self.at.surface.barrier.distance
-        if gap > CLOSED * reach:
+        if gap > least * reach:
             return ""
-        raise SolveError(
+        return (
             f"{surface.label}: its barrier (stiffness {surface.barrier.stiffness:.4g}, distance "
             f"{reach:.4g}) is too weak for this impact: the gap closed to {gap / reach:.1e} of the "
             "distance; suggest a barrier for the speed of the impact"
@@ -202,7 +229,11 @@ class ContactTerm(StencilTerm):
         """
         gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
         reach = self.at.surface.barrier.distance
-        if gap < min(NEARLY_CLOSED * reach, self.smallest) and self.configuration.comm.rank == 0:
-            text = f"{self.at.surface.label}: the gap closed to {gap / reach:.2%} of the barrier's"
-            warnings.warn(f"{text} distance: a stiffer one is due", ContactWarning, stacklevel=2)
         self.smallest = min(self.smallest, gap)
+        if gap > min(NEARLY_CLOSED * reach, 0.5 * self._warned):
+            return
+        self._warned = gap
+        if self.configuration.comm.rank == 0:
+            share = f"{100 * gap / reach:.2g} % of the barrier's distance"
+            text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
+            warnings.warn(text, ContactWarning, stacklevel=2)
