@@ -11,6 +11,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import radians
 
 from mpi4py import MPI
@@ -18,7 +19,7 @@ from mpi4py import MPI
 import numpy as np
 from _failure_meshes import plate
 
-from ufl_origami.analytic import ZFold, cantilever_end_shear
+from ufl_origami.analytic import ZFold, ZFoldState, cantilever_end_shear
 from ufl_origami.gallery import z_fold
 from ufl_origami.gallery.shell_problems import displacement
 from ufl_origami.material import Material
@@ -151,9 +152,7 @@ def pulled_fold(setting: Setting, method: Method, sheets: Sheets) -> Task:
     scene.crease("crease", setting.eta * E * setting.h**3)
     scene.fix("left_edge")
     scene.move("right_edge", x=OPENING, y=0.0, z=0.0)
-    fold = ZFold.from_eta(setting.eta, stiffness=E * setting.h**3 / 12)
-    exact = fold.solve(OPENING)
-    opened = fold.rigid_angle(OPENING) - fold.rest_angle
+    exact, opened = opened_fold(setting.eta, setting.h)
 
     def error(model: Model) -> float:
         pull = model.reaction("right_edge")[0] / exact.force - 1.0
@@ -161,6 +160,13 @@ def pulled_fold(setting: Setting, method: Method, sheets: Sheets) -> Task:
         return float(max(abs(pull), abs(angle) / opened))
 
     return Task(scene, error)
+
+
+@cache
+def opened_fold(eta: float, h: float) -> tuple[ZFoldState, float]:
+    """Exact state of the pulled z-fold, and the angle by which rigid panels would open."""
+    fold = ZFold.from_eta(eta, stiffness=E * h**3 / 12)
+    return fold.solve(OPENING), fold.rigid_angle(OPENING) - fold.rest_angle
 
 
 def flat_fold() -> CreasePattern:

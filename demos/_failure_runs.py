@@ -2,7 +2,8 @@
 
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from petsc4py import PETSc
@@ -59,17 +60,18 @@ class Outcome:
 
     Attributes:
         setting, method, solver: the case.
-        verdict: "right", "wrong" (an equilibrium beyond the bound) or "failed".
+        verdict: "right", "wrong" (a solution beyond the bound) or "failed".
         error: distance from the exact answer, None where it failed.
         iterations: Newton iterations, those of failed tries included.
-        reached: load factor of the last accepted state.
+        reached: load factor of the last accepted state, or its share of the time.
         reason: why it failed, or an empty string.
         warned: kinds of the warnings given, sorted.
         triangles, unknowns: size of the model.
         seconds: wall-clock time, the model's assembly included.
+        measured: what else was measured, by name.
     """
 
-    setting: Setting
+    setting: Any
     method: str
     solver: str
     verdict: str
@@ -81,6 +83,7 @@ class Outcome:
     triangles: int
     unknowns: int
     seconds: float
+    measured: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def silent(self) -> bool:
@@ -90,8 +93,8 @@ class Outcome:
     def row(self) -> dict[str, Any]:
         """Flat values, for CSV and summary.json."""
         values = asdict(self)
-        setting = values.pop("setting")
-        return setting | values | {"warned": "; ".join(self.warned)}
+        setting, measured = values.pop("setting"), values.pop("measured")
+        return setting | values | measured | {"warned": "; ".join(self.warned)}
 
 
 class Budgeted(NewtonSolver):
@@ -131,12 +134,12 @@ def run_case(
         if not reason:
             warn_sagitta(model)
             warn_round_off(model)
-    verdict, error = _judge(case, model, reason, bound)
+    error = None if reason else case.error(model)
     return Outcome(
         setting=setting,
         method=method.name,
         solver=solver.name,
-        verdict=verdict,
+        verdict=judge(error, bound),
         error=error,
         iterations=newton.spent,
         reached=path.steps[-1].time if path.steps else 0.0,
@@ -164,11 +167,11 @@ def _follow(path: StaticPath, model: Model) -> str:
     return ""
 
 
-def _judge(case: Task, model: Model, reason: str, bound: float) -> tuple[str, float | None]:
-    if reason:
-        return "failed", None
-    error = case.error(model)
-    return ("right" if error <= bound else "wrong"), error
+def judge(error: float | None, bound: float) -> str:
+    """Verdict on a solution by its error, on none by None."""
+    if error is None:
+        return "failed"
+    return "right" if error <= bound else "wrong"
 
 
 def _kinds(caught: list[warnings.WarningMessage], case: Task, model: Model) -> tuple[str, ...]:

@@ -2,47 +2,68 @@
 
 import csv
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
-from _failure_cases import Setting
 from _failure_runs import VERDICTS, Outcome
 
-Rows = Mapping[str, Setting]
+Rows = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Study:
-    """The declared grid and its outcomes.
+    """A declared grid and its outcomes; not every method needs to meet every case.
 
     Attributes:
-        folder: where files go.
-        bound: error above which an equilibrium is wrong.
+        name: stem of its maps' files.
+        title: its heading.
+        explained: which solution is wrong, in a sentence.
         methods: names of the discretisations.
-        solvers: names of the solvers.
+        solvers: names of the solvers, or of the ways to step.
+        own: those of them that are the package's own.
         groups: title -> label -> setting.
         pairs: title -> label -> label -> setting.
         outcomes: (setting, method, solver) -> outcome.
+        number, numbers: what a map's cell says of an outcome, and how the legend calls it.
+        columns: in which the map of single difficulties is set.
     """
 
-    folder: Path
-    bound: float
+    name: str
+    title: str
+    explained: str
     methods: Sequence[str]
     solvers: Sequence[str]
+    own: Sequence[str]
     groups: Mapping[str, Rows]
     pairs: Mapping[str, Mapping[str, Rows]]
-    outcomes: Mapping[tuple[Setting, str, str], Outcome]
+    outcomes: Mapping[tuple[Any, str, str], Outcome]
+    number: Callable[[Outcome], str]
+    numbers: str
+    columns: int = 1
 
     def picked(self, method: str, solver: str) -> list[Outcome]:
         """All outcomes of a method with a solver."""
         return [o for (_, m, s), o in self.outcomes.items() if (m, s) == (method, solver)]
 
+    def singles(self) -> set:
+        """Settings of one difficulty."""
+        return {setting for rows in self.groups.values() for setting in rows.values()}
 
-def write_csv(study: Study) -> Path:
+
+def flat_rows(studies: Iterable[Study]) -> list[dict[str, Any]]:
+    """One row a case of all studies, with the same columns; None where a case lacks a value."""
+    every = [o for study in studies for o in study.outcomes.values()]
+    columns = dict.fromkeys(f.name for o in every for f in fields(o.setting))
+    rows = [o.row() for o in every]
+    columns |= dict.fromkeys(name for row in rows for name in row)
+    return [{name: row.get(name) for name in columns} for row in rows]
+
+
+def write_csv(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write failure_map.csv, one line a case."""
-    rows = [outcome.row() for outcome in study.outcomes.values()]
-    file = study.folder / "failure_map.csv"
+    file = folder / "failure_map.csv"
     with file.open("w", newline="", encoding="ascii") as stream:
         writer = csv.DictWriter(stream, [*rows[0]])
         writer.writeheader()
@@ -50,31 +71,34 @@ def write_csv(study: Study) -> Path:
     return file
 
 
-def write_text(study: Study) -> str:
+def write_text(folder: Path, studies: Iterable[Study]) -> str:
     """Write failure_map.md; its text."""
+    text = "\n".join(_text(study) for study in studies)
+    (folder / "failure_map.md").write_text(text, encoding="ascii")
+    return text
+
+
+def _text(study: Study) -> str:
     every = [*study.outcomes.values()]
     silent = [o for o in every if o.silent]
     count = Counter(o.verdict for o in every)
     total = ", ".join(f"{count[v]} {v}" for v in ("right", "failed", "wrong"))
     parts = [
-        "# Where methods fail",
-        f"{len(every)} cases: {total}, of which {len(silent)} silent. An equilibrium is wrong when "
-        f"its error is above {study.bound:.0%} (tip of the cantilever; pull and fold angle of the "
-        "z-fold; angle, crease and tip of a closed fold). Silent: wrong, and no warning was given.",
+        f"# {study.title}",
+        f"{len(every)} cases: {total}, of which {len(silent)} silent. {study.explained} Silent: "
+        "wrong, and no warning was given.",
         "## Counts",
         _counts(study),
         "## Wrong and silent",
-        _list(silent) if silent else "None.",
+        _list(silent),
         "## Wrong, with a warning",
         _wrong_by_warning(o for o in every if o.verdict == "wrong" and o.warned),
-        "## Failed with the package's own solver",
-        _list(o for o in every if o.verdict == "failed" and o.solver in study.solvers[2:]),
+        f"## Failed with {' or '.join(study.own)}",
+        _list(o for o in every if o.verdict == "failed" and o.solver in study.own),
         "## Warnings",
         _warnings(every),
     ]
-    text = "\n\n".join(parts) + "\n"
-    (study.folder / "failure_map.md").write_text(text, encoding="ascii")
-    return text
+    return "\n\n".join(parts) + "\n"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -90,7 +114,8 @@ def _counts(study: Study) -> str:
             found = study.picked(method, solver)
             count = Counter(o.verdict for o in found)
             silent = sum(o.silent for o in found)
-            rows.append([method, solver, *(count[v] for v in VERDICTS), silent])
+            if found:
+                rows.append([method, solver, *(count[v] for v in VERDICTS), silent])
     return table(["method", "solver", *VERDICTS, "wrong and silent"], rows)
 
 
@@ -105,16 +130,18 @@ def _list(outcomes: Iterable[Outcome]) -> str:
 
 def _end(outcome: Outcome) -> str:
     if outcome.error is None:
-        return f"at load factor {outcome.reached:.3g}: {outcome.reason}"
+        return f"at {outcome.reached:.3g} of the path: {outcome.reason}"
     return f"error {outcome.error:.1%}"
 
 
 def _order(outcome: Outcome) -> tuple:
+    """By problem, then by difficulty, large thicknesses first."""
     setting = outcome.setting
-    return (setting.problem, setting.mesh, -setting.h, setting.eta, setting.angle, setting.steps)
+    names = [f.name for f in fields(setting)]
+    return tuple(-setting.h if name == "h" else getattr(setting, name) for name in names)
 
 
-def describe(setting: Setting) -> str:
+def describe(setting: Any) -> str:
     """A setting in words: the problem and what differs from its defaults."""
     other = [
         f"{f.name} {getattr(setting, f.name)}"

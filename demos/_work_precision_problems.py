@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from math import pi
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_origami.analytic import ZFold
+from ufl_origami.analytic import ZFold, ZFoldState
 from ufl_origami.analytic.reference_tables import read_table
 from ufl_origami.gallery import shell_problems as shells
 from ufl_origami.gallery import z_fold
@@ -144,11 +145,11 @@ def z_fold_case(setting: Setting) -> Case:
 
 def z_fold_errors(model: Model) -> dict[str, float]:
     """Included angle and pull relative to the elastica, profile relative to W; collective."""
-    exact = ZFold.from_eta(ETA).solve(OPENING)
+    exact, line = elastica()
     included = pi - abs(model.mean_fold_angle("crease"))
     pull = float(model.reaction("right_edge")[0])
     profile = gather_profile(model, "front")
-    distance = None if profile is None else profile_distance(*profile, exact)
+    distance = None if profile is None else profile_distance(*profile, line)
     return {
         "angle": included / exact.included_angle - 1.0,
         "force": pull / exact.force - 1.0,
@@ -156,17 +157,23 @@ def z_fold_errors(model: Model) -> dict[str, float]:
     }
 
 
-def profile_distance(rest: np.ndarray, now: np.ndarray, exact) -> float:
+@cache
+def elastica() -> tuple[ZFoldState, np.ndarray]:
+    """Exact state of the Z-fold, and places (n, 2) along both panels: x and depth."""
+    exact = ZFold.from_eta(ETA).solve(OPENING)
+    left, right = exact.profile(20001)
+    return exact, np.concatenate([left, right[-2::-1]])
+
+
+def profile_distance(rest: np.ndarray, now: np.ndarray, line: np.ndarray) -> float:
     """Largest distance of vertices from the places of the same material points on the elastica.
 
     Args:
         rest: rest positions (n, 3) along one edge of the sheet, the left outer edge first.
         now: current positions (n, 3).
-        exact: state of the elastica.
+        line: places (m, 2) along the elastica.
     """
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rest, axis=0), axis=1))])
-    left, right = exact.profile(20001)
-    line = np.concatenate([left, right[-2::-1]])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     along *= arc[-1] / along[-1]  # chords are shorter than arcs by 1e-9
     x, depth = (np.interp(arc, along, line[:, i]) for i in (0, 1))

@@ -18,6 +18,7 @@ from ufl_origami.timing import Times, timed
 from ufl_origami.work_precision import Point
 
 STEPS = (0.125, 0.25, 0.5, 1.0)
+QUICK_STEPS = (0.5, 1.0)
 MESHES = ("structured", "unstructured")
 REPEATS = 10  # runs of a point, at most
 ENOUGH = 0.5  # seconds after which a point is not run again
@@ -91,7 +92,8 @@ def choose(problem: Problem, method: Method, comm: MPI.Comm, *, quick: bool) -> 
         ]
 
     thickness = problem.middle_thickness
-    steps = [trial for step in STEPS for trial in tries(measures[0], step)]
+    sizes = QUICK_STEPS if quick else STEPS
+    steps = [trial for size in sizes for trial in tries(measures[0], size)]
     step = best_step(steps)
     tried = [t for measure in measures for t in tries(measure, step) if len(measures) > 1]
     return Choice(step, best_measure(tried) if tried else measures[0], steps, tried)

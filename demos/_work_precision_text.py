@@ -5,7 +5,7 @@ from statistics import median
 
 from _work_precision_figures import COSTS, NAMES, known
 from _work_precision_problems import METHODS, Problem, own_check
-from _work_precision_runs import MESHES, REPEATS, STEPS, THINNER, Choice, Trial, same
+from _work_precision_runs import MESHES, REPEATS, THINNER, Choice, Trial, same
 from _work_precision_verdicts import TIE, TOLERANCES, Verdict, judge, methods_of
 
 from ufl_origami.work_precision import Cost, Point, order, picked
@@ -191,7 +191,7 @@ def orders(points: Sequence[Point]) -> list[str]:
     """Order of each curve in the size of the mesh."""
     lines = [
         "Of the largest error, fitted through the three finest meshes; where these have reached "
-        "the floor of the reference (last section) it says nothing.",
+        'the floor of the reference (see "What the references allow") it says nothing.',
         "",
     ]
     methods = methods_of(points)
@@ -226,7 +226,8 @@ def shares(points: Sequence[Point]) -> list[str]:
 
 def settings(choices: Mapping[str, Mapping[str, Choice]]) -> list[str]:
     """What each method was run with, and the scan that chose it."""
-    steps = ", ".join(f"{step:g}" for step in STEPS)
+    sizes = load_steps(choices)
+    steps = ", ".join(f"{size:g}" for size in sizes)
     lines = [
         f"Chosen for each problem and method on its middle meshes, of both kinds, at the middle "
         f"thickness. Load step: out of {steps} of the load the one with the fewest factorisations "
@@ -239,7 +240,7 @@ def settings(choices: Mapping[str, Mapping[str, Choice]]) -> list[str]:
     ]
     for problem, chosen in choices.items():
         for name, choice in chosen.items():
-            counts = ", ".join(effort(choice, step) for step in STEPS)
+            counts = ", ".join(effort(choice, size) for size in sizes)
             tried = [f"{t.measure} {100 * t.largest:.2g} % ({t.mesh})" for t in choice.measures]
             measure = choice.measure or "-"
             cells = [f"{choice.step:g}", counts, measure, ", ".join(tried) or "-"]
@@ -247,9 +248,16 @@ def settings(choices: Mapping[str, Mapping[str, Choice]]) -> list[str]:
     return lines
 
 
+def load_steps(choices: Mapping[str, Mapping[str, Choice]]) -> list[float]:
+    """Load steps of the scan."""
+    every = [choice for chosen in choices.values() for choice in chosen.values()]
+    return sorted({trial.step for choice in every for trial in choice.steps})
+
+
 def effort(choice: Choice, step: float) -> str:
     """Factorisations of one load step in the scan, "-" where it is of no use."""
-    reference = {(t.mesh, t.n): t.errors for t in choice.steps if t.step == STEPS[0]}
+    smallest = min(t.step for t in choice.steps)
+    reference = {(t.mesh, t.n): t.errors for t in choice.steps if t.step == smallest}
     some = [t for t in choice.steps if t.step == step]
     if not all(same(t.errors, reference[t.mesh, t.n]) for t in some):
         return "-"

@@ -1,34 +1,46 @@
 """Where methods fail: a declared grid of hard cases, solved and judged by exact solutions.
 
 Each method (discretisation) meets each difficulty with each solver, one difficulty at a time from
-a base case, and two declared pairs of difficulties. A case ends right, wrong (an equilibrium
-further than the bound from the exact answer) or failed (no equilibrium found). A wrong answer of
-which no warning told is the worst kind: failure_map.md lists all of them.
+a base case, and two declared pairs of difficulties; then difficulties in time with each way to
+step. A case ends right, wrong (a solution further than the bound from the exact answer) or failed
+(none was found). A wrong answer of which no warning told is the worst kind: failure_map.md lists
+all of them.
 
     ./run demo failure_map
     ./run demo failure_map --quick
+    ./run demo failure_map --problem impact block skid corner
     ./run demo failure_map -n 2
 
 newton is plain Newton and bt a line search, both with equal load steps and no cuts; default is the
 package's own solver in the same steps; auto is the package's own solver with automatic steps, as
-solve_static has them, of which only the first one is declared.
+solve_static has them, of which only the first one is declared. In time, euler and bdf2 take equal
+steps; auto is BDF2 with the automatic steps of solve_dynamic, of which dt is the first one.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from mpi4py import MPI
 
-from _failure_cases import Method, Setting, Sheets
+import _impact_grid as in_time
+from _failure_cases import PROBLEMS, Method, Setting, Sheets
 from _failure_figures import draw_all
 from _failure_meshes import mesh_kinds
-from _failure_runs import Solver, run_case
-from _failure_text import Study, describe, write_csv, write_text
+from _failure_runs import Outcome, Solver, run_case
+from _failure_text import Rows, Study, describe, flat_rows, write_csv, write_text
+from _impact_cases import PROBLEMS as THROWS
+from _impact_runs import run_throw
 
 from ufl_origami.demo import fail_together, read_options, write_summary
+from ufl_origami.sheet import known_name
 
 # %% The declared grid
-BOUND = 0.03  # error above which an equilibrium is a wrong answer
+BOUND = 0.03  # error above which a solution is a wrong answer
 CLAIMED_ANGLE = 200.0  # degrees to which the claim at the end goes
+EXPLAINED = (
+    f"An equilibrium is wrong when its error is above {BOUND:.0%} (tip of the cantilever; pull and "
+    "fold angle of the z-fold; angle, crease and tip of a closed fold)."
+)
 BASE = Setting()
 FOLD = Setting("z-fold")
 METHODS = (
@@ -53,8 +65,10 @@ QUICK = {
     "mesh": ("one-diagonal", "criss-cross", "Delaunay", "slivers 2 deg"),
     "h": (1e-2, 1e-4),
     "eta": (1e-6, 1.0),
-    "steps": (1, 4),
+    "steps": (4,),
     "angle": (200.0,),
+    "mesh of pairs": ("criss-cross", "Delaunay"),
+    "eta of pairs": (1e-6,),
 }
 CLOSINGS = ("rest angle", "moment", "edge")
 
@@ -82,58 +96,128 @@ def declare(values):
         closing = Setting(f"closed by {by}")
         title = f"flat fold, h/W = {closing.h:g}, {closing.steps} steps: closed by {by} to"
         groups[title] = vary(closing, "angle", values)
-    pairs = {
-        f"{title}: {name} and h": {
-            label: vary(one, "h", values) for label, one in vary(start, name, values).items()
-        }
-        for title, start, name in (("cantilever", BASE, "mesh"), ("z-fold", FOLD, "eta"))
-    }
+    pairs = {}
+    for title, start, name in (("cantilever", BASE, "mesh"), ("z-fold", FOLD, "eta")):
+        paired = {name: values.get(f"{name} of pairs", values[name])}
+        rows = {label: vary(one, "h", values) for label, one in vary(start, name, paired).items()}
+        pairs[f"{title}: {name} and h"] = rows
     return groups, pairs
+
+
+def in_short(setting, method, solver):
+    """Whether a case is in the short grid: all solvers meet the plate's single difficulties."""
+    single = setting.mesh == BASE.mesh or setting.h == BASE.h
+    every = single and setting.problem == "cantilever" and method.model == "ddg"
+    return every or solver.name == "auto"
 
 
 # %% Solution
 comm = MPI.COMM_WORLD
 fail_together(comm)
-options = read_options("failure_map", __doc__, {}, quick={}, comm=comm)
-groups, pairs = declare(QUICK if options.quick else WHOLE)
-tables = {**groups, **{f"{t}, {k}": row for t, pair in pairs.items() for k, row in pair.items()}}
-sheets, outcomes = Sheets(comm, coarser=2 if options.quick else 1), {}
-for title, rows in tables.items():
-    found = [
-        run_case(setting, method, solver, sheets, BOUND)
-        for setting in rows.values()
-        for method in METHODS
-        for solver in SOLVERS
-        if (setting, method.name, solver.name) not in outcomes
-    ]
-    outcomes |= {(one.setting, one.method, one.solver): one for one in found}
-    if found and comm.rank == 0:
-        seconds = sum(one.seconds for one in found)
-        print(f"{title}: {len(found)} cases in {seconds:.0f} s", flush=True)
+names = (*PROBLEMS, *THROWS)
+options = read_options("failure_map", __doc__, {"problem": names}, quick={}, comm=comm)
+for name in options.problem:
+    known_name(name, names, "problem")
 
-# %% Results
-study = Study(
-    folder=options.output,
-    bound=BOUND,
+
+def chosen(tables):
+    """The tables of rows or of pairs whose problem was asked for."""
+    return {title: rows for title, rows in tables.items() if first(rows) in options.problem}
+
+
+def first(rows) -> str:
+    """Problem of the first setting of a table."""
+    row = next(iter(rows.values()))
+    return first(row) if isinstance(row, dict) else row.problem
+
+
+groups, pairs = map(chosen, declare(QUICK if options.quick else WHOLE))
+throws = chosen(in_time.declare(in_time.QUICK if options.quick else in_time.WHOLE))
+sheets = Sheets(comm, coarser=2 if options.quick else 1)
+
+
+def solve(tables: Mapping[str, Rows], methods, solvers, run: Callable, in_short: Callable) -> dict:
+    """Outcomes of all cases of some tables, or of those in the short grid."""
+    outcomes: dict[tuple, Outcome] = {}
+    for title, rows in tables.items():
+        found = [
+            run(setting, method, solver)
+            for setting in dict.fromkeys(rows.values())
+            for method in methods
+            for solver in solvers
+            if (setting, method.name, solver.name) not in outcomes
+            and (in_short(setting, method, solver) or not options.quick)
+        ]
+        outcomes |= {(one.setting, one.method, one.solver): one for one in found}
+        if found and comm.rank == 0:
+            seconds = sum(one.seconds for one in found)
+            print(f"{title}: {len(found)} cases in {seconds:.0f} s", flush=True)
+    return outcomes
+
+
+tables = {**groups, **{f"{t}, {k}": row for t, pair in pairs.items() for k, row in pair.items()}}
+statics = Study(
+    name="failure_map",
+    title="Where methods fail",
+    explained=EXPLAINED,
     methods=[method.name for method in METHODS],
     solvers=[solver.name for solver in SOLVERS],
+    own=("default", "auto"),
     groups=groups,
     pairs=pairs,
-    outcomes=outcomes,
+    outcomes=solve(
+        tables, METHODS, SOLVERS, lambda *case: run_case(*case, sheets, BOUND), in_short
+    ),
+    number=lambda outcome: str(outcome.iterations),
+    numbers="Newton iterations",
 )
+dynamics = Study(
+    name="failure_map_time",
+    title="Where methods fail in time",
+    explained=in_time.EXPLAINED,
+    methods=[method.name for method in in_time.METHODS],
+    solvers=[way.name for way in in_time.WAYS],
+    own=in_time.OWN,
+    groups=throws,
+    pairs={},
+    outcomes=solve(
+        throws,
+        in_time.METHODS,
+        in_time.WAYS,
+        lambda *case: run_throw(*case, comm, in_time.BOUND),
+        in_time.in_short,
+    ),
+    number=lambda outcome: "" if outcome.error is None else f"{100 * outcome.error:.1f}",
+    numbers="error in per cent; T: the contact's time, of a block that of its slide",
+    columns=2,
+)
+
+# %% Results
+studies = [study for study in (statics, dynamics) if study.outcomes]
 if comm.rank == 0:
-    write_summary(options.output, [one.row() for one in outcomes.values()])
-    write_csv(study)
-    print("\n" + write_text(study))
-    draw_all(study)
+    rows = flat_rows(studies)
+    write_summary(options.output, rows)
+    write_csv(options.output, rows)
+    print("\n" + write_text(options.output, studies))
+    draw_all(options.output, studies)
     print(f"\nfailure_map.md, failure_map.csv, summary.json and the maps are in {options.output}")
 
-# %% The claim
-singles = {setting for rows in groups.values() for setting in rows.values()}
-singles = {setting for setting in singles if setting.angle <= CLAIMED_ANGLE}
-claimed = [one for one in study.picked("director", "auto") if one.setting in singles]
+# %% The claims
+singles = {setting for setting in statics.singles() if setting.angle <= CLAIMED_ANGLE}
+claimed = [one for one in statics.picked("director", "auto") if one.setting in singles]
 missed = [describe(one.setting) for one in claimed if one.verdict != "right"]
-if comm.rank == 0:
+thrown = [one for method in in_time.METHODS for one in dynamics.picked(method.name, "auto")]
+failed = [one for one in thrown if one.verdict == "failed" and in_time.names_barrier(one)]
+lost = [describe(one.setting) for one in thrown if one.verdict != "right" and one not in failed]
+gaps = [one.measured["min_gap"] for one in dynamics.outcomes.values()]
+through = sum(gap is not None and gap <= 0 for gap in gaps)
+if statics.outcomes and comm.rank == 0:
     text = f"director, auto: {len(claimed) - len(missed)} of {len(claimed)} single difficulties"
     print(f"{text} (folds closed to at most {CLAIMED_ANGLE:g} deg) end right")
+if dynamics.outcomes and comm.rank == 0:
+    text = f"in time, auto: {len(thrown) - len(failed) - len(lost)} of {len(thrown)} single"
+    text += f" difficulties end right, {len(failed)} fail and name the barrier"
+    print(f"{text}; {through} of all sheets go through the floor")
 assert not missed, f"the claim fails: {missed}"
+assert not lost, f"the claim in time fails: {lost}"
+assert not through, f"{through} sheets went through the floor"

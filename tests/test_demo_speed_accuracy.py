@@ -12,13 +12,26 @@ import pytest
 from matplotlib.image import imread
 
 from ufl_origami.recommendation import TABLE
-from ufl_origami.work_precision import Point, order, picked, read_points
+from ufl_origami.work_precision import (
+    Point,
+    fitted_order,
+    order,
+    picked,
+    read_points,
+    read_time_points,
+)
 
 pytestmark = pytest.mark.serial  # each test starts its own processes
 
 REPO = Path(__file__).resolve().parent.parent
 TITLES = {"averaged": "DDG averaged", "director": "DDG director", "fem": "FEM twin"}
 MESHES = ("structured", "unstructured")
+MOTIONS = ("vibration", "snap", "impact")
+CURVES = {
+    (scheme, control): f"{title} with {control} steps"
+    for scheme, title in (("implicit_euler", "implicit Euler"), ("bdf2", "BDF2"))
+    for control in ("fixed", "adaptive")
+}
 
 
 def demo(folder, *words, ranks=1):
@@ -34,7 +47,7 @@ def demo(folder, *words, ranks=1):
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory):
-    """Folder, points and text of the quick demo."""
+    """Folder, points over meshes and text of the quick demo."""
     folder = tmp_path_factory.mktemp("speed")
     done = demo(folder, "--quick")
     assert done.returncode == 0, done.stderr
@@ -43,12 +56,23 @@ def quick(tmp_path_factory):
     return folder, read_points(folder / "speed_accuracy.csv"), text
 
 
+@pytest.fixture(scope="module")
+def moved(quick):
+    """Points over time steps of the quick demo."""
+    return read_time_points(quick[0] / "time_precision.csv")
+
+
 def curve(points, method, mesh):
     return picked(points, method=method, mesh=mesh)
 
 
+def steps_of(points, problem, curve):
+    """Points of an integrator with one kind of steps, from long to short."""
+    return picked(points, problem=problem, scheme=curve[0], control=curve[1])
+
+
 def test_every_point_is_complete(quick):
-    folder, points, _ = quick
+    points = quick[1]
     assert {(p.method, p.mesh) for p in points} == {(m, k) for m in TITLES for k in MESHES}
     empty = {"error_deflection", "failure"}
     for p in points:
@@ -60,8 +84,28 @@ def test_every_point_is_complete(quick):
         assert (p.bending, p.measure != "") == (
             ("", False) if p.model == "fem" else (p.method, True)
         )
-    runs = json.loads((folder / "summary.json").read_text())["runs"]
-    assert runs == [asdict(p) for p in points]
+
+
+def test_every_motion_is_complete(moved):
+    assert {(p.problem, p.scheme, p.control) for p in moved} == {
+        (problem, *curve) for problem in MOTIONS for curve in CURVES
+    }
+    for p in moved:
+        assert not p.failure and p.dofs > 0 and p.newton_iterations >= p.steps > 0
+        parts = p.assembly_seconds, p.factorisation_seconds, p.rest_seconds
+        assert min(parts) > 0 and sum(parts) == pytest.approx(p.seconds, rel=1e-9)
+        if p.control == "fixed":
+            assert (p.cuts, p.steps) == (0, round(1 / p.size))
+            shortest = longest = p.duration * p.size
+        else:
+            shortest, longest = p.smallest_step, p.largest_step
+            assert 2 * shortest < longest < p.duration
+        assert (p.smallest_step, p.largest_step) == pytest.approx((shortest, longest), rel=1e-9)
+
+
+def test_summary_has_all_points(quick, moved):
+    runs = json.loads((quick[0] / "summary.json").read_text())["runs"]
+    assert runs == [asdict(p) for p in (*quick[1], *moved)]
 
 
 def test_observed_orders(quick):
@@ -85,6 +129,23 @@ def test_errors_are_ranked_as_claimed(quick):
         twin = curve(points, "fem", mesh)[-1]
         same = [p for p in curve(points, "director", mesh) if p.size == twin.size]
         assert twin.error() < 0.2 * same[0].error()
+
+
+def test_observed_orders_in_time(moved):
+    """BDF2 seems to have order 2.2: its reference has no more than twice as many steps."""
+    for scheme, expected in (("implicit_euler", 1.0), ("bdf2", 2.2)):
+        found = steps_of(moved, "vibration", (scheme, "fixed"))
+        sizes, errors = [p.size for p in found], [p.error() for p in found]
+        assert fitted_order(sizes, errors) == pytest.approx(expected, abs=0.15)
+
+
+@pytest.mark.parametrize("problem", MOTIONS)
+def test_bdf2_beats_implicit_euler(moved, problem):
+    """With steps not shorter than those of implicit Euler, and as many seconds or fewer."""
+    euler, bdf2 = (steps_of(moved, problem, (s, "fixed")) for s in ("implicit_euler", "bdf2"))
+    same = [p for p in bdf2 if p.size == euler[0].size]
+    assert same[0].error() < 0.2 * euler[0].error()
+    assert bdf2[-1].error() < 0.01 < 0.2 * euler[-1].error()
 
 
 def cost(points, tolerance, name):
@@ -147,6 +208,42 @@ def test_readme_quotes_the_text():
     assert all(sentence.rstrip(".") in text for sentence in quoted)
 
 
+@pytest.mark.parametrize("problem", MOTIONS)
+@pytest.mark.parametrize("tolerance", [0.01, 0.001])
+def test_text_names_the_integrator_that_wins(quick, moved, problem, tolerance):
+    paid = {c: cost(steps_of(moved, problem, c), tolerance, "seconds") for c in CURVES}
+    section = quick[2].split("## Which integrator wins")[1]
+    line = section.split(f"- {problem}, {100 * tolerance:g} %: ")[1].splitlines()[0]
+    winner = min(paid, key=paid.get)
+    if paid[winner] == float("inf"):
+        assert line == "no integrator reaches it."
+        return
+    assert line.startswith(f"**{CURVES[winner]}** wins with")
+    value = float(line.split(" s;")[0].split()[-1])
+    assert value == pytest.approx(paid[winner], rel=6e-3)
+    for other in set(CURVES) - {winner}:
+        tail = line.split(f"{CURVES[other]} ")[1]
+        if paid[other] == float("inf"):
+            assert tail.startswith("does not reach it")
+        else:
+            factor = float(tail.split(" times")[0])
+            assert factor == pytest.approx(paid[other] / paid[winner], rel=6e-3)
+
+
+def test_documented_text_is_that_of_the_command(quick):
+    """The same sections, and the same motions; their figures are those of the full study."""
+    texts = (REPO / "docs" / "speed_accuracy.md").read_text(), quick[2]
+    heads, motions = (
+        [
+            [line.split(" Reference:")[0] for line in text.splitlines() if line.startswith(start)]
+            for text in texts
+        ]
+        for start in ("#", tuple(f"- {problem}: " for problem in MOTIONS))
+    )
+    assert heads[0] == heads[1] and len(heads[0]) > 10
+    assert motions[0] == motions[1] and len(motions[0]) == len(MOTIONS)
+
+
 def test_text_states_the_settings(quick):
     _, points, text = quick
     settings = text.split("## Settings")[1]
@@ -164,13 +261,13 @@ def is_drawn(file):
 
 
 def test_charts_are_drawn(quick):
-    names = ["error_dofs", "error_seconds", "speed_accuracy"]
+    names = ["error_dofs", "error_seconds", "speed_accuracy", "time_precision"]
     assert sorted(f.stem for f in quick[0].glob("*.png")) == names
     assert all(is_drawn(quick[0] / f"{name}.png") for name in names)
 
 
 def test_two_ranks_find_the_same_errors(quick, tmp_path):
-    done = demo(tmp_path, "--quick", "--method", "director", ranks=2)
+    done = demo(tmp_path, "--quick", "--problem", "z_fold", "--method", "director", ranks=2)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("# Speed against accuracy\n") == 1
     others = picked(quick[1], method="director")
@@ -181,6 +278,22 @@ def test_two_ranks_find_the_same_errors(quick, tmp_path):
         assert (p.triangles, p.dofs) == (one.triangles, one.dofs)
         assert p.error("force") == pytest.approx(one.error("force"), rel=1e-4)
         assert p.error("profile") == pytest.approx(one.error("profile"), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_two_ranks_follow_the_same_impact(moved, tmp_path):
+    """Errors agree to what Newton's tolerance leaves of them after all steps."""
+    done = demo(tmp_path, "--quick", "--problem", "impact", ranks=2)
+    assert done.returncode == 0, done.stderr
+    found, alone = (
+        read_time_points(tmp_path / "time_precision.csv"),
+        picked(moved, problem="impact"),
+    )
+    assert len(found) == len(alone)
+    for p, one in zip(picked(found), alone, strict=True):
+        for name in ("scheme", "control", "size", "dofs", "steps"):
+            assert getattr(p, name) == getattr(one, name)
+        assert p.error() == pytest.approx(one.error(), rel=1e-3)
 
 
 def test_unknown_names_end_with_close_ones(tmp_path):

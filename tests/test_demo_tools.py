@@ -65,6 +65,18 @@ def test_wrong_options_end_all_ranks_with_code_2(words, comm):
 
 
 @pytest.mark.serial
+def test_help_names_what_quick_replaces_and_nothing_where_it_replaces_nothing(capsys):
+    for quick, text in (
+        ({"eta": (3.0,), "h": 0.5}, "a short run: eta 3.0, h 0.5"),
+        ({}, "a short run"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            read("--help", **quick)
+        assert stop.value.code == 0
+        assert " ".join(capsys.readouterr().out.split()).endswith(f"--quick {text}")
+
+
+@pytest.mark.serial
 def test_summary_refuses_numbers_that_json_lacks(tmp_path):
     file = write_summary(tmp_path / "new", [{"eta": 0.1}, {"eta": 1.0}])
     assert json.loads(file.read_text()) == {"runs": [{"eta": 0.1}, {"eta": 1.0}]}

@@ -1,9 +1,9 @@
 """Points of work-precision charts, their file, and what a tolerance costs.
 
-A curve is one method's points over its meshes, from coarse to fine. An error that is small on one
-mesh by chance, because it changes sign there, is no accuracy: a tolerance counts as met from that
-mesh on from which all finer ones meet it too. Costs in between are interpolated on the logarithmic
-chart.
+A curve is one method's points over its meshes, or one integrator's over its time steps, from coarse
+to fine. An error that is small on one mesh by chance, because it changes sign there, is no
+accuracy: a tolerance counts as met from that mesh on from which all finer ones meet it too. Costs
+in between are interpolated on the logarithmic chart.
 """
 
 import csv
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import ceil, inf, isfinite, log
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -92,6 +92,61 @@ class Point:
         return max(found)
 
 
+@dataclass(frozen=True)
+class TimePoint:
+    """One motion followed by one integrator.
+
+    Attributes:
+        problem, scheme: what moved, the integrator.
+        control: how steps were chosen, "fixed" or "adaptive".
+        size: fixed step over the duration, or tolerance of the local error.
+        duration: last time.
+        dofs: number of unknowns.
+        steps, newton_iterations, factorisations, cuts: effort of the motion.
+        smallest_step, largest_step: of the accepted steps.
+        seconds, assembly_seconds, factorisation_seconds, rest_seconds: see timing.py.
+        elapsed: elapsed seconds.
+        deviation: relative distance from the reference at the end, None where the motion failed.
+        failure: why it stopped, or an empty string.
+    """
+
+    problem: str
+    scheme: str
+    control: str
+    size: float
+    duration: float
+    dofs: int
+    steps: int
+    newton_iterations: int
+    factorisations: int
+    cuts: int
+    smallest_step: float
+    largest_step: float
+    seconds: float
+    assembly_seconds: float
+    factorisation_seconds: float
+    rest_seconds: float
+    elapsed: float
+    deviation: float | None = None
+    failure: str = ""
+
+    def error(self) -> float:
+        """The deviation; inf where the motion failed."""
+        return inf if self.deviation is None else self.deviation
+
+
+class Refined(Protocol):
+    """Anything that stands on a curve from coarse to fine."""
+
+    @property
+    def size(self) -> float:
+        """What is refined: the smaller, the finer."""
+
+
+Row = TypeVar("Row", Point, TimePoint)
+Place = TypeVar("Place", bound=Refined)
+
+
 def error_names(points: Iterable[Point]) -> tuple[str, ...]:
     """The `ERRORS` that any of the points has."""
     points = list(points)
@@ -102,10 +157,19 @@ def error_names(points: Iterable[Point]) -> tuple[str, ...]:
 
 def write_points(file: str | Path, points: Iterable[Point]) -> Path:
     """Write points as CSV, one line a point, columns as `Point`."""
+    return _write(file, Point, points)
+
+
+def write_time_points(file: str | Path, points: Iterable[TimePoint]) -> Path:
+    """Write points as CSV, one line a point, columns as `TimePoint`."""
+    return _write(file, TimePoint, points)
+
+
+def _write(file: str | Path, kind: type[Row], points: Iterable[Row]) -> Path:
     path = Path(file)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="ascii") as stream:
-        writer = csv.DictWriter(stream, [field.name for field in fields(Point)])
+        writer = csv.DictWriter(stream, [field.name for field in fields(kind)])
         writer.writeheader()
         for point in points:
             writer.writerow({k: "" if v is None else v for k, v in asdict(point).items()})
@@ -118,21 +182,33 @@ def read_points(file: str | Path) -> list[Point]:
     Raises:
         InputError: the file has other columns, or a cell that is no number where one is due.
     """
-    kinds = get_type_hints(Point)
+    return _read(file, Point)
+
+
+def read_time_points(file: str | Path) -> list[TimePoint]:
+    """Read points of motions back.
+
+    Raises:
+        InputError: the file has other columns, or a cell that is no number where one is due.
+    """
+    return _read(file, TimePoint)
+
+
+def _read(file: str | Path, kind: type[Row]) -> list[Row]:
+    kinds = get_type_hints(kind)
     with Path(file).open(newline="", encoding="ascii") as stream:
         reader = csv.DictReader(stream)
         if list(reader.fieldnames or ()) != list(kinds):
             raise InputError(f"{file} is no table of work and precision: {reader.fieldnames}")
         rows = list(reader)
     try:
-        return [_point(row, kinds) for row in rows]
+        return [kind(**_parsed(row, kinds)) for row in rows]
     except ValueError as error:
         raise InputError(f"{file}: {error}") from error
 
 
-def _point(row: Mapping[str, str], kinds: Mapping[str, object]) -> Point:
-    values: dict[str, Any] = {name: _parse(kinds[name], text) for name, text in row.items()}
-    return Point(**values)
+def _parsed(row: Mapping[str, str], kinds: Mapping[str, object]) -> dict[str, Any]:
+    return {name: _parse(kinds[name], text) for name, text in row.items()}
 
 
 def _parse(kind: object, text: str) -> str | int | float | None:
@@ -143,7 +219,7 @@ def _parse(kind: object, text: str) -> str | int | float | None:
     return float(text) if text or kind is float else None
 
 
-def picked(points: Iterable[Point], **values: object) -> list[Point]:
+def picked(points: Iterable[Place], **values: object) -> list[Place]:
     """The points with these values, from coarse to fine."""
     found = [p for p in points if all(getattr(p, k) == v for k, v in values.items())]
     return sorted(found, key=lambda point: -point.size)
@@ -204,8 +280,19 @@ def place_of(errors: Sequence[float], tolerance: float) -> float | None:
 
 def order(points: Sequence[Point], error: str = "largest", last: int = 3) -> float:
     """Order in the size of the mesh, fitted through the last points from coarse to fine."""
-    some = [p for p in points if 0 < p.error(error) < inf][-last:]
+    return fitted_order([p.size for p in points], [p.error(error) for p in points], last)
+
+
+def fitted_order(sizes: Sequence[float], errors: Sequence[float], last: int = 3) -> float:
+    """Order of errors in sizes, fitted through the last ones that are positive and finite; or nan.
+
+    Args:
+        sizes: what is refined (n,), from coarse to fine.
+        errors: errors (n,).
+        last: how many count.
+    """
+    some = [(s, e) for s, e in zip(sizes, errors, strict=True) if 0 < e < inf][-last:]
     if len(some) < 2:
         return float("nan")
-    sizes, errors = [log(p.size) for p in some], [log(p.error(error)) for p in some]
-    return float(np.polyfit(sizes, errors, 1)[0])
+    log_sizes, log_errors = [log(s) for s, _ in some], [log(e) for _, e in some]
+    return float(np.polyfit(log_sizes, log_errors, 1)[0])

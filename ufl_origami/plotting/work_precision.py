@@ -17,13 +17,13 @@ _LEVEL = "#8a8a8a"
 
 @dataclass(frozen=True)
 class WorkCurve:
-    """Errors of one method on one kind of mesh.
+    """Errors of one method on one kind of mesh, or with one kind of steps.
 
     Attributes:
         cost: costs (n,), positive.
         error: errors (n,), positive.
         method: name in the legend, by colour.
-        mesh: name in the legend, by marker and line.
+        mesh: kind of mesh or steps in the legend, by marker and line.
     """
 
     cost: ArrayLike
@@ -55,6 +55,7 @@ def work_precision_chart(
     abscissa: str,
     levels: Sequence[float] = (0.01, 0.001),
     least: float | None = None,
+    refined: str = "mesh",
 ) -> Path:
     """Errors against cost, both logarithmic; equal axes in a row, equal abscissae everywhere.
 
@@ -65,6 +66,7 @@ def work_precision_chart(
         abscissa: name of the costs, with unit.
         levels: errors that thin lines mark.
         least: error at which the charts end; None: all are shown.
+        refined: what the curves refine, in the legend.
 
     Raises:
         InputError: nothing to draw.
@@ -91,8 +93,13 @@ def work_precision_chart(
             axes.set_axis_off()
         _name_axes(grid, panels, columns, abscissa)
         entries = [_entry(i, None, name) for i, name in enumerate(methods)]
-        entries += [_entry(None, i, f"{name} mesh") for i, name in enumerate(meshes)]
-        figure.legend(handles=entries, loc="outside lower center", ncols=_legend_columns(columns))
+        entries += [_entry(None, i, f"{name} {refined}") for i, name in enumerate(meshes)]
+        figure.legend(
+            handles=entries,
+            loc="outside lower center",
+            ncols=_legend_columns(columns),
+            handlelength=2.6,
+        )
     return path
 
 
