@@ -12,6 +12,7 @@ from ufl_origami.barrier import Barrier
 from ufl_origami.errors import SceneError
 from ufl_origami.obstacles import Box, Cylinder, Plane, SignedDistance, Sphere
 from ufl_origami.terms.gaps import LEFT, Gaps
+from ufl_origami.terms.nodes import sparse_sum
 
 rng_of = np.random.default_rng
 FRAME = np.linalg.qr(rng_of(3).normal(size=(3, 3)))[0]
@@ -27,7 +28,8 @@ def cloud():
 
 
 def gaps_of(obstacle):
-    return Gaps(cloud().functions, obstacle, np.ones(100))
+    functions = cloud().functions
+    return Gaps(functions, obstacle, sparse_sum(functions, np.ones(100)))
 
 
 def moved(points):

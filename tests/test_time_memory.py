@@ -3,6 +3,7 @@
 import ctypes
 import gc
 import sys
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from time_scenes import fixed, landing
 
 import ufl_origami as uo
+from ufl_origami.solvers.newton import NewtonSolver
 
 pytestmark = pytest.mark.serial
 
@@ -68,6 +70,34 @@ def test_steps_leave_nothing_on_the_heap_but_rows():
     growth, result = grown(heap_in_use, 60, 160, 1e-3)
     row = max(map(sys.getsizeof, result.history.rows))
     assert growth / 100 < row + 200
+
+
+def solve_in_time(scene):
+    return uo.solve_dynamic(scene, [2e-3], fixed(1e-3), record=NARROW)
+
+
+def solve_at_rest(scene):
+    scene.fix("left")
+    return uo.solve_static(scene, [1e-3])
+
+
+@pytest.mark.parametrize("solve", [solve_in_time, solve_at_rest])
+def test_a_solve_gives_its_factors_back_without_the_garbage_collector(monkeypatch, solve):
+    solvers, made = [], NewtonSolver.__init__
+
+    def noted(self, *args):
+        made(self, *args)
+        solvers.append(weakref.ref(self))
+
+    monkeypatch.setattr(NewtonSolver, "__init__", noted)
+    scene = landing()
+    gc.disable()
+    try:
+        result = solve(scene)
+        assert len(result.steps) and len(solvers) == 1
+        assert solvers[0]() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.slow

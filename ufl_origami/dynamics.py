@@ -112,6 +112,7 @@ def solve_dynamic(
     run = _start(model, time, find_scheme(scheme), settings, record)
     log, steps = Log(model, record, run), []
     with ExitStack() as stack:
+        stack.callback(run.path.newton.close)
         disk = None
         if output is not None:
             disk = stack.enter_context(Disk(log, Path(output)))

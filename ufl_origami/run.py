@@ -97,6 +97,7 @@ def solve_static(
     record = record or Record()
     log = Log(model, record, _StaticRun(path, model, record))
     with ExitStack() as stack:
+        stack.callback(solver.close)
         disk = None
         if output is not None:
             disk = stack.enter_context(Disk(log, Path(output)))

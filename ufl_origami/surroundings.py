@@ -106,7 +106,7 @@ def surrounding_terms(
         friction_term(
             contacts[spec.obstacle],
             spec.law,
-            touching(configuration, functions, spec.on) * contacts[spec.obstacle].at.share.x.array,
+            touching(configuration, functions, spec.on) * contacts[spec.obstacle].at.sum.nodes,
             lagged=spec.lagged,
         )
         for spec in scene.frictions

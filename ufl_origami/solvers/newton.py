@@ -135,6 +135,12 @@ class NewtonSolver:
         self._careful: PETSc.SNES | None = None
         self.linear = Factorisation(self._full.getKSP(), problem.tangent.matrix, problem.symmetric)
 
+    def close(self) -> None:
+        """Give the factors' memory back: solver and callbacks hold each other."""
+        for snes in (self._careful, self._full):
+            if snes is not None:
+                snes.destroy()
+
     def _create_snes(self, line_search: str) -> PETSc.SNES:
         matrix = self.problem.tangent.matrix
         snes = PETSc.SNES().create(matrix.comm)

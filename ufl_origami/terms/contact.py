@@ -19,6 +19,7 @@ from ufl_origami.obstacles import Obstacle
 from ufl_origami.terms.base import StencilTerm
 from ufl_origami.terms.form import NodalFormTerm, SheetFunctions
 from ufl_origami.terms.gaps import Gaps
+from ufl_origami.terms.nodes import SparseSum, sparse_sum
 
 CLOSED = 1e-6
 """Gap over the barrier's reach below which a state is refused: the barrier gives way."""
@@ -57,23 +58,21 @@ class Touch(NamedTuple):
     Attributes:
         surface: the surface.
         gaps: distances of the nodes that can touch.
-        share: function, 1 at these nodes and 0 elsewhere.
+        sum: sum over these nodes.
         place: UFL constant, the obstacle's displacement.
     """
 
     surface: Surface
     gaps: Gaps
-    share: fem.Function
+    sum: SparseSum
     place: fem.Constant
 
 
 def touch(functions: SheetFunctions, surface: Surface, nodes: np.ndarray) -> Touch:
-    """Distances and functions of a surface for the nodes (nd,) that can touch it."""
-    element = ("Lagrange", 2 if functions.second_order else 1)
-    share = fem.Function(fem.functionspace(functions.sheet.mesh, element))
-    share.x.array[:] = nodes
-    gaps = Gaps(functions, surface.obstacle, nodes)
-    return Touch(surface, gaps, share, functions.number(surface.motion(0.0)))
+    """Distances and functions of a surface for the nodes (nd,) that can touch it; collective."""
+    total = sparse_sum(functions, nodes)
+    gaps = Gaps(functions, surface.obstacle, total)
+    return Touch(surface, gaps, total, functions.number(surface.motion(0.0)))
 
 
 class ContactTerm(StencilTerm):
@@ -101,8 +100,8 @@ class ContactTerm(StencilTerm):
             number(barrier.stiffness),
             number(barrier.distance),
         )
-        nodes, energy = at.share.x.array, at.share * density * functions.nodal()
-        self._form = NodalFormTerm(nodes, "contact", functions, energy=energy)
+        energy = at.sum.of(density)
+        self._form = NodalFormTerm(at.sum.here, "contact", functions, energy=energy)
         self.smallest = self._warned = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
         self._seen: tuple[np.ndarray, float] | None = None

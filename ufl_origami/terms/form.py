@@ -183,6 +183,29 @@ def assembled(form: fem.Form, size: int) -> np.ndarray:
     return out
 
 
+class DeadForce:
+    """Linear form that no displacement changes: assembled where its other data have changed.
+
+    Args:
+        term: whose linear form it is.
+    """
+
+    def __init__(self, term: FormSum):
+        self._form, self._size = term._residual, len(term.functions.dofs)
+        functions = [f for f in term.linear_form.coefficients() if f is not term.functions.u]
+        self._data = [*functions, *term.linear_form.constants()]
+        self._seen: list[np.ndarray] | None = None
+        self._values = np.zeros(self._size)
+
+    def values(self) -> np.ndarray:
+        """This rank's share (size,)."""
+        data = [d.value if isinstance(d, fem.Constant) else d.x.array for d in self._data]
+        if self._seen is None or not all(map(np.array_equal, data, self._seen)):
+            self._values = assembled(self._form, self._size)
+            self._seen = [np.copy(values) for values in data]
+        return self._values
+
+
 class FormTerm(FormSum, MatrixTerm):
     """A UFL energy or force on the displacement; see `FormSum` for the arguments."""
 
@@ -191,6 +214,15 @@ class FormTerm(FormSum, MatrixTerm):
         derivative = ufl.derivative(self.linear_form, functions.u)
         tangent = ufl.algorithms.expand_derivatives(derivative)
         self._tangent = None if tangent.empty() else compiled(tangent)
+        self._dead = DeadForce(self) if tangent.empty() else None
+
+    def add_residual(self, state: State, out: np.ndarray) -> None:
+        """Add the linear form, assembled anew where it may have changed."""
+        if self._dead is None:
+            super().add_residual(state, out)
+            return
+        self.functions.time.value = state.time
+        out[self.functions.dofs] += self._dead.values()
 
     def add_tangent(self, state: State, matrix) -> None:
         """Add the assembled derivative of the linear form; nothing for a linear energy."""

@@ -26,6 +26,7 @@ from ufl_origami.terms.form import (
     SheetFunctions,
     pushed_forward,
 )
+from ufl_origami.terms.nodes import NodalSum, full_sum, sparse_sum
 
 
 @dataclass(frozen=True)
@@ -61,29 +62,32 @@ class FrictionForm:
         contact: the obstacle's contact.
         sliding: functions of the step under way.
         lagged: whether pressure and normal are those of the last accepted state.
-        integrand: potential per rest area (lagged), or minus the traction paired with a test
+        total: sum over the nodes that have it.
+        density: potential per rest area (lagged), or minus the traction paired with a test
             function.
     """
 
     contact: ContactTerm
     sliding: Sliding
     lagged: bool
-    integrand: Expr
+    total: NodalSum
+    density: Expr
 
     @property
     def argument(self) -> dict[str, ufl.Form]:
         """The form under the name by which a term takes it."""
-        dx = self.contact.functions.nodal()
-        return {"energy" if self.lagged else "force": self.integrand * dx}
+        return {"energy" if self.lagged else "force": self.total.of(self.density)}
 
 
 def friction_form(
     contact: ContactTerm, law: FrictionLaw, share: np.ndarray, *, lagged: bool
 ) -> FrictionForm:
-    """Friction of the nodes (nd,) with share 1."""
-    functions, at = contact.functions, contact.at
-    sliding, weight = Sliding.create(functions), fem.Function(at.share.function_space)
-    weight.x.array[:] = share
+    """Friction of the nodes (nd,) with share 1; collective.
+
+    Where directions are those of the sheet, all triangles around a node have their part in it.
+    """
+    functions, at, sliding = contact.functions, contact.at, Sliding.create(contact.functions)
+    total = (full_sum if law.couples_nodes else sparse_sum)(functions, share)
     u, place = (sliding.last, sliding.before) if lagged else (functions.u, at.place)
     number, barrier = functions.number, at.surface.barrier
     x = ufl.variable(ufl.SpatialCoordinate(functions.sheet.mesh) + u - place)
@@ -105,7 +109,7 @@ def friction_form(
     else:
         drag = law.drag(along(velocity), number, carry)
         density = ufl.inner(drag, ufl.TestFunction(functions.V))
-    return FrictionForm(contact, sliding, lagged, weight * pressure * density)
+    return FrictionForm(contact, sliding, lagged, total, pressure * density)
 
 
 def friction_term(
@@ -122,7 +126,9 @@ def friction_term(
     form, functions = friction_form(contact, law, share, lagged=lagged), contact.functions
     if law.couples_nodes and not lagged:
         return CoupledFriction(form, FormTerm("friction", functions, **form.argument))
-    return NodalFriction(form, NodalFormTerm(share, "friction", functions, **form.argument))
+    return NodalFriction(
+        form, NodalFormTerm(form.total.here, "friction", functions, **form.argument)
+    )
 
 
 class FrictionTerm(Term):

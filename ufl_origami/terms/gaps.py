@@ -13,6 +13,7 @@ from dolfinx import fem
 from ufl_origami.errors import SceneError
 from ufl_origami.obstacles import Obstacle
 from ufl_origami.terms.form import JIT_OPTIONS, SheetFunctions
+from ufl_origami.terms.nodes import SparseSum
 
 LEFT = 0.1
 """Share of each gap that a step must leave."""
@@ -33,10 +34,10 @@ class Gaps:
     Args:
         functions: the scene's shared functions.
         obstacle: the body, described at displacement zero.
-        nodes: (nd,) whether each node of the displacement's space can touch it.
+        total: sum over the nodes that can touch it, of which each rank measures its own.
     """
 
-    def __init__(self, functions: SheetFunctions, obstacle: Obstacle, nodes: np.ndarray):
+    def __init__(self, functions: SheetFunctions, obstacle: Obstacle, total: SparseSum):
         self.functions, self.obstacle = functions, obstacle
         mesh, self._place = functions.sheet.mesh, functions.field()
         x = ufl.variable(ufl.SpatialCoordinate(mesh) + self._place)
@@ -45,14 +46,12 @@ class Gaps:
         points = functions.node_points()
         self._distance = fem.Expression(distance, points, jit_options=JIT_OPTIONS)
         self._slope = fem.Expression(slope, points, jit_options=JIT_OPTIONS)
-        table = functions.V.dofmap.list[: functions.sheet.num_owned_cells]
-        cells, corner = np.nonzero(nodes[table])
-        self._nodes, first = np.unique(table[cells, corner], return_index=True)
-        self._cells, self._corner = cells[first], corner[first]
+        self._nodes = np.flatnonzero(total.here)
+        self._cells, self._corner = total.cells, total.corners
         self._all = self._grouped(slice(None))
 
     def __len__(self) -> int:
-        """Number of nodes of this rank's triangles that can touch."""
+        """Number of this rank's nodes that can touch."""
         return len(self._nodes)
 
     def at(self, nodes: np.ndarray, some: np.ndarray | None = None) -> np.ndarray:
