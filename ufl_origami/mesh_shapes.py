@@ -226,31 +226,71 @@ def cylinder_octant(
     Raises:
         MeshError: on all ranks: sizes or n out of range, unknown structure.
     """
+    sides = ("sym_y0", "sym_z0", "free_end", "sym_x0")
+    points = {"A": (0, 0.0), "B": (1, 0.0), "C": (2, 0.0)}
+    part = _CylinderPart(radius, length, 0.5 * math.pi, sides, points)
+    return part.mesh(n, structure, comm)
 
-    def surface(uv: np.ndarray) -> np.ndarray:
-        angle = uv[:, 0] / radius
+
+def roof_quarter(
+    radius: float,
+    length: float,
+    half_angle: float,
+    n: Count,
+    *,
+    structure: str = "structured",
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> SheetMesh:
+    """Mesh the quarter x, y >= 0 of a cylindrical roof along y, |y| <= length / 2, normal outwards.
+
+    Its top is (0, 0, radius). Edges "sym_x0", "sym_y0" (in the planes x = 0, y = 0), "straight" (at
+    the half angle) and "free_end" (y = length / 2). Points "A" = the top and "B" = the middle of
+    the free end (0, length / 2, radius).
+
+    Args:
+        radius: radius.
+        length: length of the whole roof.
+        half_angle: half of its opening angle (radians).
+        n: segments round (of the half angle) and along y; one number counts round.
+        structure: "structured" (one diagonal), "crisscross" or "unstructured".
+        comm: communicator.
+
+    Raises:
+        MeshError: on all ranks: sizes or n out of range, unknown structure.
+    """
+    sides, points = ("sym_y0", "straight", "free_end", "sym_x0"), {"A": (0, 0.0), "B": (3, 0.0)}
+    return _CylinderPart(radius, length, half_angle, sides, points).mesh(n, structure, comm)
+
+
+@dataclass(frozen=True)
+class _CylinderPart:
+    """Quarter of a part of a cylinder along y, from its top to an angle and from y = 0 on."""
+
+    radius: float
+    length: float
+    angle: float
+    sides: tuple[str, str, str, str]
+    points: dict[str, tuple[int, float]]
+
+    def mesh(self, n: Count, structure: str, comm: MPI.Comm) -> SheetMesh:
+        return build_sheet(comm, lambda: _mesh(self._shape(), n, structure), self._onto)
+
+    def _shape(self) -> _Shape:
+        _check_positive(radius=self.radius, length=self.length, angle=self.angle)
+        arc, half = self.angle * self.radius, 0.5 * self.length
+        lengths, counted = (arc, half, arc, half), (arc, half)
+        return _Shape(
+            (0.0, 0.0), (arc, half), lengths, counted, self.sides, self.points, self._surface
+        )
+
+    def _surface(self, uv: np.ndarray) -> np.ndarray:
+        angle, radius = uv[:, 0] / self.radius, self.radius
         return np.stack([radius * np.sin(angle), uv[:, 1], radius * np.cos(angle)], axis=1)
 
-    def make() -> SheetArrays:
-        _check_positive(radius=radius, length=length)
-        quarter, half = 0.5 * math.pi * radius, 0.5 * length
-        shape = _Shape(
-            (0.0, 0.0),
-            (quarter, half),
-            (quarter, half, quarter, half),
-            (quarter, half),
-            ("sym_y0", "sym_z0", "free_end", "sym_x0"),
-            {"A": (0, 0.0), "B": (1, 0.0), "C": (2, 0.0)},
-            surface,
-        )
-        return _mesh(shape, n, structure)
-
-    def onto(points: np.ndarray) -> np.ndarray:
+    def _onto(self, points: np.ndarray) -> np.ndarray:
         round_axis = points * np.array([1.0, 0.0, 1.0])
-        away = radius / np.linalg.norm(round_axis, axis=1)[:, None] - 1.0
+        away = self.radius / np.linalg.norm(round_axis, axis=1)[:, None] - 1.0
         return points + away * round_axis
-
-    return build_sheet(comm, make, onto)
 
 
 def _check_positive(**values: float) -> None:

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.configuration import MIDDLE
+from ufl_origami.configuration import MIDDLE, Configuration
 from ufl_origami.errors import SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
@@ -135,6 +135,11 @@ class NewtonSolver:
         self._careful: PETSc.SNES | None = None
         self.linear = Factorisation(self._full.getKSP(), problem.tangent.matrix, problem.symmetric)
 
+    @property
+    def extrapolates(self) -> bool:
+        """Whether tangents take their stress from the iterate before."""
+        return self.settings.method == "default"
+
     def close(self) -> None:
         """Give the factors' memory back: solver and callbacks hold each other."""
         for snes in (self._careful, self._full):
@@ -240,9 +245,9 @@ class NewtonSolver:
         if not self.settings.reuse or snes.getIterationNumber() == 0:
             return False
         before, now = self.report.residuals[-2:]
-        return now < before and now * (now / before) ** self.settings.reuse < self._tolerance()
+        return now < before and now * (now / before) ** self.settings.reuse < self.tolerance()
 
-    def _tolerance(self) -> float:
+    def tolerance(self) -> float:
         """Residual norm at which the iteration ends."""
         return max(self.settings.rtol * self.problem.force_scale, self._floor)
 
@@ -303,7 +308,7 @@ class NewtonSolver:
         self.report.residuals.append(norm)
         if not np.isfinite(norm):
             return reason.DIVERGED_FNORM_NAN
-        if norm <= self._tolerance():
+        if norm <= self.tolerance():
             return reason.CONVERGED_FNORM_RELATIVE
         return reason.CONVERGED_ITERATING
 
@@ -394,7 +399,13 @@ def shift_weights(problem: Problem) -> PETSc.Vec:
 
     Prescribed unknowns weigh nothing: a shift of their unit diagonal would change their values.
     """
-    configuration = problem.configuration
+    vector = area_weights(problem.configuration)
+    vector.array_w[problem.constraints.dofs] = 0.0
+    return vector
+
+
+def area_weights(configuration: Configuration, *, angles: bool = True) -> PETSc.Vec:
+    """Lumped rest area at displacements, area squared (or nothing) at angles."""
     sheet = configuration.sheet
     n = sheet.num_owned_cells
     corners = sheet.rest[sheet.cells[:n]]
@@ -406,10 +417,9 @@ def shift_weights(problem: Problem) -> PETSc.Vec:
     for name in configuration.edge_unknowns:
         slot = configuration.slot(name)[sheet.cell_edges[:n]]
         used = slot >= 0
-        per_edge = area / 3 if name in MIDDLE else area**2
+        per_edge = area / 3 if name in MIDDLE else angles * area**2
         weight = np.broadcast_to(per_edge[:, None], slot.shape)[used]
         np.add.at(local, 3 * configuration.nv + slot[used], weight)
     vector = configuration.create_vector()
     configuration.add_to_global(local, vector)
-    vector.array_w[problem.constraints.dofs] = 0.0
     return vector
