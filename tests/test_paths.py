@@ -1,7 +1,8 @@
 """Paths by arc length: limit points, sway, stops and resumed runs of a truss of two panels.
 
-Each panel is a bar between hinges, of Saint Venant-Kirchhoff material in Green's strain. With half span a, height w0 and length L the load at the height w is
-P = E h b w (w0^2 - w^2) / L^3, and the apex sways at w^2 = w0^2 - 2 a^2.
+Each panel is a bar between hinges, of Saint Venant-Kirchhoff material in Green's strain. With half
+span a, height w0 and length L the load at the height w is P = E h b w (w0^2 - w^2) / L^3, and the
+apex sways at w^2 = w0^2 - 2 a^2.
 """
 
 import numpy as np
