@@ -229,7 +229,8 @@ class Surroundings:
         Args:
             mass: alpha (1 / time): force -alpha M v.
             stiffness: beta (time): stresses, moments and crease moments beta times the stiffness
-                and the rates of strain, curvature and fold angle; rigid motion is not damped.
+                and the rates of strain, curvature and fold angle; rigid motion is not damped, nor
+                is a crease where its law's moment falls.
 
         Raises:
             SceneError: a negative factor, or damping that is declared already.
