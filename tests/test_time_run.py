@@ -68,6 +68,30 @@ def test_resumed_run_equals_the_uninterrupted_one_bit_for_bit(folder, whole, mod
             assert (ours.array_r == reference.array_r).all()
 
 
+def lift(time):
+    """Goes, rests and goes again."""
+    return np.interp(time, [0.0, 0.2, 0.4, 0.6], [0.0, 0.05, 0.05, 0.1])
+
+
+def lifted():
+    """A loaded strip whose held end is lifted."""
+    scene = strip("ddg")
+    scene.motions.clear()
+    scene.move("x0", x=0.0, y=0.0, z=lift)
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    return scene
+
+
+@pytest.mark.serial
+def test_a_motion_resumed_while_its_support_rests_does_the_same_work(folder):
+    options = {"record": PLAIN, "output": folder}
+    whole = uo.solve_dynamic(lifted(), [0.3, 0.6], fixed(0.05), record=PLAIN)
+    uo.solve_dynamic(lifted(), [0.3], fixed(0.05), **options)
+    resumed = uo.solve_dynamic(lifted(), [0.3, 0.6], fixed(0.05), resume=True, **options)
+    assert bits(resumed.history) == bits(whole.history)
+    assert np.ptp(whole.history["work"]) > 0
+
+
 @pytest.mark.serial
 def test_rare_checkpoints_hold_the_last_step_of_a_stopped_run(folder, whole):
     rare = dataclasses.replace(PLAIN, checkpoint=1e9)
