@@ -10,6 +10,7 @@ import pytest
 from time_scenes import ALONE, LANDING, PLAIN, SHARP, fixed, free_square, landing, momenta, strip
 
 import ufl_origami as uo
+from ufl_origami.solvers.schemes import ImplicitEuler
 
 STOPS = (0.12, 0.25)
 
@@ -66,6 +67,28 @@ def test_resumed_run_equals_the_uninterrupted_one_bit_for_bit(folder, whole, mod
             (resumed.model.motion.v, whole.model.motion.v),
         ):
             assert (ours.array_r == reference.array_r).all()
+
+
+class Patient(ImplicitEuler):
+    """Implicit Euler that keeps many states and notes how many each step is handed."""
+
+    name, memory = "patient", 12
+
+    def __init__(self):
+        self.handed = []
+
+    def formula(self, time, past):
+        self.handed.append(len(past))
+        return super().formula(time, past)
+
+
+@pytest.mark.serial
+def test_a_scheme_with_a_long_memory_is_resumed_with_all_of_it(folder):
+    options = {"record": PLAIN, "output": folder}
+    uo.solve_dynamic(free_square("ddg"), [1.4], fixed(0.1), scheme=Patient(), **options)
+    scheme = Patient()
+    uo.solve_dynamic(free_square("ddg"), [1.5], fixed(0.1), scheme=scheme, resume=True, **options)
+    assert scheme.handed == [12]
 
 
 def lift(time):
