@@ -23,6 +23,7 @@ import ufl
 from dolfinx import fem, mesh
 
 from ufl_origami.gallery.shell_problems import ShellProblem
+from ufl_origami.scene_parts import LoadFactor
 
 JIT_OPTIONS = {"timeout": 300}
 REDUCED, FULL = 2, 4
@@ -67,7 +68,7 @@ class Strip:
         """The strip of `cantilever_shear`, at load factor 1."""
         sheet, material = problem.scene.sheet, problem.scene.material
         (load,) = problem.scene.loads
-        values = material.E, material.h, load.value(1.0)
+        values = material.E, material.h, load.function(LoadFactor())(1.0)
         constants = (fem.Constant(sheet.mesh, value) for value in values)
         return cls(sheet.mesh, sheet.edges, *constants, sheet.rest[sheet.point_vertex("x1y0")])
 

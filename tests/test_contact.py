@@ -62,6 +62,8 @@ def test_two_obstacles_of_one_name_and_what_is_no_obstacle_are_refused():
         scene.obstacle("body", Plane((0.0, 0.0, -2.0)), Barrier(1.0, 0.1))
     with pytest.raises(SceneError, match="is no obstacle"):
         scene.obstacle("other", "plane", Barrier(1.0, 0.1))
+    with pytest.raises(SceneError, match="obstacle 'other': None is no barrier"):
+        scene.obstacle("other", Plane((0.0, 0.0, -2.0)), None)
     with pytest.raises(InputError, match="no edge set is named 'x2'"):
         scene.obstacle("other", Plane((0.0, 0.0, -2.0)), Barrier(1.0, 0.1), on=["x2"])
 

@@ -13,8 +13,11 @@ from test_terms import direction, remainders, skew_part
 from ufl_origami.barrier import Barrier
 from ufl_origami.errors import InputError, SceneError
 from ufl_origami.friction_laws import Anisotropic, Coulomb, Direction, OneWay
+from ufl_origami.material import Material
+from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.obstacles import Plane, Sphere
 from ufl_origami.problem import Problem
+from ufl_origami.scene import Scene
 from ufl_origami.terms.base import Rates
 
 MU, EPS = 0.3, 0.2
@@ -119,6 +122,8 @@ REFUSED = {
     "friction: direction: the vector is zero": lambda: OneWay(MU, Direction((0.0,) * 3), EPS),
     "friction: direction: expected 3 finite": lambda: OneWay(MU, Direction((1.0, 0.0)), EPS),
     "friction: eps: -1.0 must be positive": lambda: OneWay(MU, Direction(ALONG), -1.0),
+    r"\(1, 0, 0\) is no direction: Direction\(": lambda: OneWay(MU, (1, 0, 0), EPS),
+    "'x' is no direction": lambda: Anisotropic(0.2, 0.5, "x", EPS),
     "no obstacle is named 'roof'; there are": lambda: block().friction("roof", LAWS["coulomb"]),
     "on 'floor': 0.3 is no friction law": lambda: block().friction("floor", 0.3),
 }
@@ -130,6 +135,17 @@ def test_laws_and_places_that_are_none_are_refused():
             make()
     with pytest.raises(InputError, match="'x2'"):
         block().friction("floor", LAWS["coulomb"], on=["x2"])
+
+
+@pytest.mark.mpi
+def test_friction_of_places_that_cannot_touch_is_refused(comm):
+    scene = Scene(rectangle(1.0, 1.0, n=(2, 2), comm=comm), Material(1e8, 0.3, 0.01, rho=1.0))
+    scene.obstacle("body", BODIES["plane"], WIDE, on=["x0"])
+    scene.friction("body", LAWS["coulomb"], on=["y0"])  # they have a corner in common
+    assert len(build(scene).in_time) == 1
+    scene.friction("body", LAWS["coulomb"], on=["x1"])
+    with pytest.raises(SceneError, match=r"on 'body': none of \['x1'\] can touch the obstacle"):
+        build(scene)
 
 
 def block():

@@ -24,7 +24,7 @@ from contact_scenes import (
 from ufl_origami.barrier import Barrier
 from ufl_origami.discretise import build
 from ufl_origami.dynamics import solve_dynamic
-from ufl_origami.errors import ContactWarning, SolveError
+from ufl_origami.errors import ContactWarning, SceneError, SolveError
 from ufl_origami.gallery import z_fold
 from ufl_origami.history import Record
 from ufl_origami.material import Material
@@ -245,6 +245,17 @@ def test_plate_flung_at_a_thin_wall_in_steps_longer_than_it_does_not_come_out_be
         result = solve_dynamic(scene, [1.0], fixed(step), record=QUIET, on_accept=watch)
         assert watch.smallest > 0 and nodes(result.model)[:, 2].min() > -0.25
         assert mean_velocity(result.model)[2] > 0  # thrown back, though most of its energy is lost
+
+
+def test_suggested_barrier_bears_gravity_that_grows_with_time():
+    scene, steady = plate(), plate()
+    steady.gravity((0.0, 0.0, -G))
+    scene.gravity(lambda time: (0.0, 0.0, -G * min(time / 0.1, 1.0)))
+    with pytest.raises(SceneError, match="give the time at which it is largest"):
+        suggest_barrier(scene, speed=1e-3)
+    assert suggest_barrier(scene, speed=1e-3, time=0.1) == suggest_barrier(steady, speed=1e-3)
+    weaker = suggest_barrier(scene, speed=1e-3, time=0.05)
+    assert weaker.stiffness == pytest.approx(0.5 * suggest_barrier(steady, 1e-3).stiffness)
 
 
 def test_gap_that_nearly_closes_gives_a_warning():

@@ -1,6 +1,7 @@
 """Runs: what the history holds, and that whatever stops a run loses no accepted step."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -120,6 +121,13 @@ def test_record_chooses_the_columns(comm):
 def test_record_of_an_unknown_name(comm, part):
     with pytest.raises(InputError, match="creas"):
         solve_static(pull(comm), [0.1], record=Record(**{part: ["creas"]}))
+
+
+@pytest.mark.parametrize("time", ["every", "checkpoint"])
+@pytest.mark.parametrize("value", [-1.0, math.nan])
+def test_times_of_writing_that_are_none_are_refused(time, value):
+    with pytest.raises(InputError, match=f"record: {time} = {value} is negative or no number"):
+        Record(**{time: value})
 
 
 @pytest.mark.mpi

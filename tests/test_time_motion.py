@@ -255,6 +255,7 @@ def test_gravity_and_inertia_of_attached_bodies(comm, model):
         (1.0, np.diag([0.1, 0.1, 0.2]), (1.5, 0.5, 0.0), "too wide for the nodes"),
         (1.0, np.diag([0.1, 0.1, 0.3]), (0.5, 0.5, 0.0), "no body has this inertia tensor"),
         (1.0, np.eye(3)[[0, 0, 2]], (0.5, 0.5, 0.0), r"expected a symmetric \(3, 3\)"),
+        (1.0, np.diag([np.inf] * 3), (0.5, 0.5, 0.0), r"expected a symmetric \(3, 3\)"),
         (-1.0, np.diag([0.1, 0.1, 0.2]), (0.5, 0.5, 0.0), "rigid inertia 'sheet'"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 from time_scenes import ALONE, LANDING, PLAIN, SHARP, fixed, free_square, landing, momenta, strip
 
 import ufl_origami as uo
+from ufl_origami.solvers.schemes import ImplicitEuler
 
 STOPS = (0.12, 0.25)
 
@@ -66,6 +67,52 @@ def test_resumed_run_equals_the_uninterrupted_one_bit_for_bit(folder, whole, mod
             (resumed.model.motion.v, whole.model.motion.v),
         ):
             assert (ours.array_r == reference.array_r).all()
+
+
+class Patient(ImplicitEuler):
+    """Implicit Euler that keeps many states and notes how many each step is handed."""
+
+    name, memory = "patient", 12
+
+    def __init__(self):
+        self.handed = []
+
+    def formula(self, time, past):
+        self.handed.append(len(past))
+        return super().formula(time, past)
+
+
+@pytest.mark.serial
+def test_a_scheme_with_a_long_memory_is_resumed_with_all_of_it(folder):
+    options = {"record": PLAIN, "output": folder}
+    uo.solve_dynamic(free_square("ddg"), [1.4], fixed(0.1), scheme=Patient(), **options)
+    scheme = Patient()
+    uo.solve_dynamic(free_square("ddg"), [1.5], fixed(0.1), scheme=scheme, resume=True, **options)
+    assert scheme.handed == [12]
+
+
+def lift(time):
+    """Goes, rests and goes again."""
+    return np.interp(time, [0.0, 0.2, 0.4, 0.6], [0.0, 0.05, 0.05, 0.1])
+
+
+def lifted():
+    """A loaded strip whose held end is lifted."""
+    scene = strip("ddg")
+    scene.motions.clear()
+    scene.move("x0", x=0.0, y=0.0, z=lift)
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    return scene
+
+
+@pytest.mark.serial
+def test_a_motion_resumed_while_its_support_rests_does_the_same_work(folder):
+    options = {"record": PLAIN, "output": folder}
+    whole = uo.solve_dynamic(lifted(), [0.3, 0.6], fixed(0.05), record=PLAIN)
+    uo.solve_dynamic(lifted(), [0.3], fixed(0.05), **options)
+    resumed = uo.solve_dynamic(lifted(), [0.3, 0.6], fixed(0.05), resume=True, **options)
+    assert bits(resumed.history) == bits(whole.history)
+    assert np.ptp(whole.history["work"]) > 0
 
 
 @pytest.mark.serial

@@ -127,15 +127,13 @@ def test_refused_stops(stops, message):
 
 def test_hard_steps_do_not_grow():
     """Beyond `easy` Newton iterations a step may not grow, beyond twice as many it shrinks."""
-    sizes = {}
-    for easy in (0, 50):
+    for easy, factor in ((1, 1 / 1.5), (2, 1.0), (50, 1.5)):
         time = uo.TimeSettings(
-            step=0.01, smallest=0.004, tolerance=LOOSE, energy_tolerance=LOOSE, easy=easy
+            step=0.02, smallest=0.008, tolerance=LOOSE, energy_tolerance=LOOSE, easy=easy
         )
-        history = uo.solve_dynamic(landing(), [0.06], time, record=PLAIN).history
-        sizes[easy] = history["step_size"][1:]
-    assert sizes[0][1] == pytest.approx(0.01 / 1.5, rel=1e-12)
-    assert sizes[50][1] == pytest.approx(0.01 * 1.5, rel=1e-12)
+        history = uo.solve_dynamic(landing(), [0.12], time, record=PLAIN, newton=SHARP).history
+        assert history["newton_iterations"][1] == 3
+        assert history["step_size"][2] == pytest.approx(factor * 0.02, rel=1e-12)
 
 
 def test_smallest_step_warns_and_goes_on():
@@ -186,6 +184,8 @@ def test_failed_step_leaves_the_last_state(settings, what):
         ({"step": 1.0, "largest": 0.5}, r"step 1.0 is not in \[smallest, largest\]"),
         ({"step": 1.0, "smallest": 2.0}, r"step 1.0 is not in \[smallest, largest\]"),
         ({"step": 1.0, "growth": 0.9}, "growth 0.9 is below 1"),
+        ({"step": 1.0, "easy": 0}, "easy 0 is below 1"),
+        ({"step": 1.0, "easy": float("nan")}, "easy nan is below 1"),
     ],
 )
 def test_refused_settings(settings, message):
@@ -193,9 +193,9 @@ def test_refused_settings(settings, message):
         uo.TimeSettings(**settings)
 
 
-def jumping(start):
-    sheet = rectangle(1.0, 1.0, n=(1, 1), comm=ALONE)
-    scene = uo.Scene(sheet, uo.Material(1e4, 0.3, 0.05, rho=1.0))
+def jumping(start, side=1.0):
+    sheet = rectangle(side, side, n=(1, 1), comm=ALONE)
+    scene = uo.Scene(sheet, uo.Material(1e4, 0.3, 0.05 * side, rho=1.0))
     scene.move("x0", x=0.0, y=0.0, z=start)
     return scene
 
@@ -209,6 +209,13 @@ def test_refused_scenes():
             uo.solve_dynamic(jumping(start), [0.1], fixed(0.1))
     with pytest.raises(uo.InputError, match=r"'rk4' is none of \('implicit_euler', 'bdf2'\)"):
         uo.solve_dynamic(free_square("ddg"), [0.1], fixed(0.1), scheme="rk4")
+
+
+@pytest.mark.parametrize("side", [1e-6, 1e6])
+def test_a_jump_is_measured_by_the_sheet(side):
+    uo.solve_dynamic(jumping(lambda time: 1e-10 * side, side), [], fixed(0.1), record=PLAIN)
+    with pytest.raises(uo.SceneError, match="prescribed motion jumps by"):
+        uo.solve_dynamic(jumping(lambda time: 1e-5 * side, side), [], fixed(0.1), record=PLAIN)
 
 
 def test_supports_start_at_the_rate_of_their_motion():

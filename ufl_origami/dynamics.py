@@ -21,7 +21,7 @@ from ufl_origami.problem import Problem
 from ufl_origami.recording import Disk, Log, ProgressBar
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
-from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep
+from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep, sheet_size
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
 from ufl_origami.surroundings import damping_terms, make_motion
@@ -34,7 +34,7 @@ REUSE = 3.0
 """Default of `NewtonSettings.reuse` in time: a step's first tangent mostly serves to its end."""
 
 JUMP = 1e-9
-"""Distance over the sheet's largest coordinate by which prescribed motion may start off."""
+"""Distance over the sheet's diagonal, or angle, by which prescribed motion may start off."""
 
 MOMENT = 1e-7
 """Time over which the rate of prescribed motion is measured at the start."""
@@ -194,14 +194,24 @@ def _check_supports(model: Model, begin: float) -> None:
     assert motion is not None
     constraints.check(begin)
     values, dofs = constraints.values(begin), constraints.dofs
+    allowed = JUMP * _sizes(model)[dofs]
     with together(model.sheet.comm):
-        jump = np.abs(values - model.x.array_r[dofs]).max(initial=0.0)
-        if jump > JUMP * max(1.0, np.abs(model.sheet.rest).max(initial=0.0)):
+        jumps = np.abs(values - model.x.array_r[dofs])
+        if (jumps > allowed).any():
+            jump = jumps[(jumps / allowed).argmax()]
             raise SceneError(
                 f"prescribed motion jumps by {jump:.3g} at time {begin:g}: give a function of time "
                 "that starts where the sheet is, or follow a static path first"
             )
     motion.v.array_w[dofs] = (constraints.values(begin + MOMENT) - values) / MOMENT
+
+
+def _sizes(model: Model) -> np.ndarray:
+    """What each owned unknown is measured by: the sheet's diagonal, or a radian; collective."""
+    sizes, dofs = np.ones(model.x.local_size), model.functions.dofs
+    owned = model.configuration.owned_dofs(dofs[model.configuration.owns(dofs)])
+    sizes[owned] = sheet_size(model.problem)
+    return sizes
 
 
 @dataclass
@@ -275,7 +285,8 @@ class _Run:
         path = self.path
         if (other := memory.get("scheme")) != path.scheme.name:
             raise InputError(f"the run to resume has scheme {other!r}, not {path.scheme.name!r}")
-        named = [("", "rate")] + [(f"before{k}", f"before{k}.rate") for k in range(1, 9)]
+        ages = range(1, path.scheme.memory)
+        named = [("", "rate")] + [(f"before{age}", f"before{age}.rate") for age in ages]
         path.past = [
             Instant(time, vectors[q] if q else self.model.x.copy(), vectors[v])
             for time, (q, v) in zip(memory["times"], named, strict=False)

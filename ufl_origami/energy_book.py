@@ -90,15 +90,21 @@ class EnergyBook:
     Attributes:
         account: after the last accepted step.
         scale: largest energy so far, see `reach`.
-        reactions: forces of the supports at the end of the last step in which they moved.
+        reactions: forces of the supports at the end of the last step.
     """
 
     def __init__(self, physical: Problem, whole: Problem, motion: Motion, at: Instant):
         self.physical, self.whole, self.motion = physical, whole, motion
         self.configuration = physical.configuration
-        self._bounded = [term for term in physical.terms if term.bounded]
-        free = [term for term in physical.terms if not term.bounded]
-        self._free = Problem(physical.configuration, free, physical.constraints)
+        self._free, self._barriers = (
+            Problem(
+                physical.configuration,
+                [term for term in physical.terms if term.bounded == bounded],
+                physical.constraints,
+            )
+            for bounded in (False, True)
+        )
+        self._supported = bool(self.configuration.sum(len(whole.constraints.dofs)))
         energies, kinetic = physical.energies(at.q), motion.kinetic_energy(at.v)
         self.account = Account(energies, kinetic, kinetic + sum(energies.values()))
         self.reactions, self._drafted = at.q.duplicate(), at.q.duplicate()
@@ -140,26 +146,27 @@ class EnergyBook:
 
     def _potentials(self, old: Instant, new: Instant, way) -> tuple[dict[str, float], float, float]:
         """Energies at the end of a step, work in time, the integrator's part of the potential."""
-        free, before = self._free, dict(self.account.energies)
-        free.set_time(old.time)
-        behind = free.energies(new.q)
+        free, barriers, before = self._free, self._barriers, self.account.energies
+        for part in (free, barriers):
+            part.set_time(old.time)
+        touched, behind = barriers.energies(old.q), free.energies(new.q)
         free.set_time(new.time)
-        ahead, energies, slopes = (
-            free.energies(old.q),
-            free.energies(new.q),
-            free.slopes(new.q, way),
-        )
+        ahead, last = free.energies(old.q), free.energies(new.q)
+        first = {kind: before[kind] - touched.get(kind, 0.0) for kind in last}
+        work = 0.5 * sum(ahead[k] - first[k] + last[k] - behind[k] for k in last)
+        work += self._carried(old, new)
+        barriers.set_time(new.time)
+        touch = barriers.energies(new.q)
+        energies = {kind: last.get(kind, 0.0) + touch.get(kind, 0.0) for kind in before}
+        slopes = [*free.slopes(new.q, way).values(), *barriers.slopes(new.q, way).values()]
+        share = sum(before[kind] - energies[kind] for kind in before) + sum(slopes)
+        return energies, work, work + share
+
+    def _carried(self, old: Instant, new: Instant) -> float:
+        """Work that moving bodies do on the terms with bounds over a step."""
         start, end = (self.configuration.state(at.q, at.time) for at in (old, new))
-        step, work, touch, slope = self.configuration.to_local(way), 0.0, 0.0, 0.0
-        for term in self._bounded:
-            work += term.carried(start, end)
-            touch, slope = touch + term.energies(end).sum(), slope + term.slope(end, step).sum()
-        work, touch, slope = map(float, self.configuration.sum([work, touch, slope]))
-        if self._bounded:
-            energies["contact"], slopes["contact"] = touch, slope
-        work += 0.5 * sum(ahead[k] - before[k] + energies[k] - behind[k] for k in ahead)
-        share = sum(before[k] - energies[k] + slopes.get(k, 0.0) for k in before)
-        return {k: energies[k] for k in before}, work, work + share
+        shares = [term.carried(start, end) for term in self._barriers.terms]
+        return float(self.configuration.sum(sum(shares)))
 
     def _follower_work(self, old: Instant, new: Instant, way) -> tuple[float, float]:
         """Work of forces without energy over a step: their mean, and those at its end."""
@@ -173,10 +180,10 @@ class EnergyBook:
 
     def _support_work(self, new: Instant, way) -> tuple[float, float]:
         """Work of the supports over a step: the mean of their forces, and those at its end."""
+        if not self._supported:
+            return 0.0, 0.0
         dofs = self.whole.constraints.dofs
         moved = way.array_r[dofs]
-        if not self.configuration.sum(float(np.abs(moved).sum())):
-            return 0.0, 0.0
         self.whole.forces(new.q, self._drafted)
         last = self._drafted.array_r[dofs] @ moved
         first = self.reactions.array_r[dofs] @ moved if self._reacted else last

@@ -37,6 +37,19 @@ class Direction:
         unit("friction: direction", self.vector)
 
 
+def require_direction(direction: object) -> None:
+    """Refuse what is no direction.
+
+    Raises:
+        SceneError: telling how to make one.
+    """
+    if not isinstance(direction, Direction):
+        raise SceneError(
+            f"friction: {direction!r} is no direction: Direction(vector) is carried by the sheet, "
+            "Direction(vector, carried=False) fixed in space"
+        )
+
+
 def coefficient(label: str, value: float) -> None:
     """Refuse a friction coefficient that is negative or not finite.
 
@@ -132,11 +145,12 @@ class Anisotropic(FrictionLaw):
     eps: float
 
     def __post_init__(self) -> None:
-        """Refuse negative coefficients, two zeros, or a speed that is not positive."""
+        """Refuse negative coefficients, two zeros, a speed that is not positive, no direction."""
         coefficient("friction: mu_along", self.mu_along)
         coefficient("friction: mu_across", self.mu_across)
         positive("friction: larger coefficient", max(self.mu_along, self.mu_across))
         positive("friction: eps", self.eps)
+        require_direction(self.direction)
 
     @property
     def couples_nodes(self) -> bool:  # type: ignore[override]
@@ -169,9 +183,10 @@ class OneWay(FrictionLaw):
     eps: float
 
     def __post_init__(self) -> None:
-        """Refuse a negative coefficient or a speed that is not positive."""
+        """Refuse a negative coefficient, a speed that is not positive, or no direction."""
         coefficient("friction: mu", self.mu)
         positive("friction: eps", self.eps)
+        require_direction(self.direction)
 
     @property
     def couples_nodes(self) -> bool:  # type: ignore[override]

@@ -78,6 +78,13 @@ class Record:
     every: float = 0.0
     checkpoint: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse times that are none."""
+        for name in ("every", "checkpoint"):
+            value = getattr(self, name)
+            if not value >= 0:
+                raise InputError(f"record: {name} = {value} is negative or no number")
+
 
 def step_row(step: Step) -> Row:
     """Columns of the step itself."""

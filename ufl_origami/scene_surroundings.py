@@ -122,13 +122,15 @@ class Surroundings:
             motion: function of time: displacement (3,) of the obstacle, zero at time 0 or not.
 
         Raises:
-            SceneError: the name is taken, or the body is none.
+            SceneError: the name is taken, or body or barrier are none.
             InputError: a place that the sheet does not have.
         """
         if name in [spec.name for spec in self.obstacles]:
             raise SceneError(f"obstacle {name!r} is declared twice")
         if not isinstance(body, Obstacle):
             raise SceneError(f"obstacle {name!r}: {body!r} is no obstacle")
+        if not isinstance(barrier, Barrier):
+            raise SceneError(f"obstacle {name!r}: {barrier!r} is no barrier")
         for place in on:
             self._require_place(place)
         if motion is not None:
@@ -215,7 +217,8 @@ class Surroundings:
         label = f"rigid inertia {name!r}"
         positive(label, mass)
         tensor = np.asarray(inertia, dtype=float)
-        if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
+        square = tensor.shape == (3, 3) and np.isfinite(tensor).all()
+        if not (square and np.allclose(tensor, tensor.T)):
             raise SceneError(f"{label}: expected a symmetric (3, 3) inertia tensor")
         spread = 0.5 * np.trace(tensor) * np.eye(3) - tensor
         if np.linalg.eigvalsh(spread)[0] < -1e-9 * np.trace(tensor):
@@ -229,7 +232,8 @@ class Surroundings:
         Args:
             mass: alpha (1 / time): force -alpha M v.
             stiffness: beta (time): stresses, moments and crease moments beta times the stiffness
-                and the rates of strain, curvature and fold angle; rigid motion is not damped.
+                and the rates of strain, curvature and fold angle; rigid motion is not damped, nor
+                is a crease where its law's moment falls.
 
         Raises:
             SceneError: a negative factor, or damping that is declared already.

@@ -14,7 +14,7 @@ from ufl_origami.model import Model, place_nodes, place_vertices
 from ufl_origami.motion import Motion
 from ufl_origami.scene import Scene
 from ufl_origami.scene_parts import LoadFactor, vector_function
-from ufl_origami.scene_surroundings import ObstacleSpec, field_varies
+from ufl_origami.scene_surroundings import FrictionSpec, ObstacleSpec, field_varies
 from ufl_origami.terms import loads
 from ufl_origami.terms.base import Term
 from ufl_origami.terms.contact import ContactTerm, Surface, touch
@@ -94,7 +94,11 @@ def make_motion(scene: Scene, configuration: Configuration, functions: SheetFunc
 def surrounding_terms(
     scene: Scene, configuration: Configuration, functions: SheetFunctions, factor: LoadFactor
 ) -> tuple[list[Term], list[Term]]:
-    """Terms of gravity, obstacles and magnets, and those that act in time only; collective."""
+    """Terms of gravity, obstacles and magnets, and those that act in time only; collective.
+
+    Raises:
+        SceneError: magnets without a field or a field without magnets, friction that acts nowhere.
+    """
     terms: list[Term] = []
     for weight in scene.weights:
         terms += gravity_terms(
@@ -103,13 +107,9 @@ def surrounding_terms(
     terms += magnetic_terms(scene, functions, factor)
     contacts = {spec.name: contact_term(spec, configuration, functions) for spec in scene.obstacles}
     frictions: list[Term] = [
-        friction_term(
-            contacts[spec.obstacle],
-            spec.law,
-            touching(configuration, functions, spec.on) * contacts[spec.obstacle].at.sum.nodes,
-            lagged=spec.lagged,
-        )
+        friction_term(contact, spec.law, rubbing(spec, contact), lagged=spec.lagged)
         for spec in scene.frictions
+        for contact in [contacts[spec.obstacle]]
     ]
     return [*terms, *contacts.values()], frictions
 
@@ -154,6 +154,20 @@ def contact_term(
     surface = Surface(spec.name, spec.body, spec.barrier, motion)
     at = touch(functions, surface, touching(configuration, functions, spec.on))
     return ContactTerm(configuration, functions, at)
+
+
+def rubbing(spec: FrictionSpec, contact: ContactTerm) -> np.ndarray:
+    """1 at the nodes (nd,) that have a friction, else 0; collective.
+
+    Raises:
+        SceneError: on all ranks; no place of the friction can touch the obstacle.
+    """
+    share = touching(contact.configuration, contact.functions, spec.on) * contact.at.sum.nodes
+    if not contact.configuration.sum(share.sum()):
+        raise SceneError(
+            f"friction on {spec.obstacle!r}: none of {list(spec.on)} can touch the obstacle"
+        )
+    return share
 
 
 def touching(

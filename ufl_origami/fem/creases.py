@@ -198,9 +198,14 @@ class FoldTerm(StencilTerm):
         blocks[0][:] = self._law(state)[2][:, None, None] * k[:, :, None] * k[:, None, :]
 
     def refer(self, scalars: np.ndarray, factor: float) -> None:
-        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor."""
+        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor.
+
+        Where the law's moment falls there is none.
+        """
         angles = self.crease.angles(scalars).T
-        self._laws = [LinearLaw(factor * self._given(a, self._time)[2], a) for a in angles]
+        stiffness = [np.maximum(self._given(a, self._time)[2], 0.0) for a in angles]
+        pairs = zip(stiffness, angles, strict=True)
+        self._laws = [LinearLaw(factor * k, angle) for k, angle in pairs]
 
     def largest_turn(self, state: State, step: np.ndarray) -> float:
         """Largest change (radians) of the virtual fold angles over a step."""

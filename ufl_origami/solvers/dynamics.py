@@ -75,8 +75,9 @@ class TimeSettings:
                 raise InputError(f"time settings: {name} = {value} is no positive number")
         if not self.least <= self.step <= self.most:
             raise InputError(f"time settings: step {self.step} is not in [smallest, largest]")
-        if self.growth < 1:
-            raise InputError(f"time settings: growth {self.growth} is below 1")
+        for name in ("growth", "easy"):
+            if not getattr(self, name) >= 1:
+                raise InputError(f"time settings: {name} {getattr(self, name)} is below 1")
 
     @property
     def least(self) -> float:

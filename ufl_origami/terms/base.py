@@ -56,6 +56,10 @@ class Rates:
         return self.rate * (q - self.base)
 
 
+SHORTEST = 1e-6
+"""Part of a step on which its slope is taken at least, however near a bound."""
+
+
 class Term(ABC):
     """One contribution to the potential energy.
 
@@ -97,7 +101,8 @@ class Term(ABC):
         """Derivatives (len(kinds),) of this rank's energies along a step from a state.
 
         They come from the energies alone, so that a force that is not the gradient of its energy
-        shows in the energy book. A term without energy gives minus the work of its force.
+        shows in the energy book; those of a bounded term from the tenth of the way to its bounds
+        next to the state. A term without energy gives minus the work of its force.
 
         Args:
             state: where the derivative is taken.
@@ -107,7 +112,10 @@ class Term(ABC):
             out = np.zeros(len(step))
             self.add_residual(state, out)
             return np.array([out @ step])
-        return central_slope(lambda part: self.energies(state.moved(part * step)))
+        ways = (step, -step) if self.bounded else ()
+        free = min((self.longest_step(state, way) for way in ways), default=1.0)
+        width = max(free, SHORTEST) / 32
+        return central_slope(lambda part: self.energies(state.moved(part * step)), width)
 
     def heat(self, state: State, step: np.ndarray) -> float:
         """What this rank's force takes over a step that ends in a state and turns into heat."""
@@ -159,7 +167,7 @@ class Term(ABC):
         """Take back the values of `history`, in the order of the keys that it gives now."""
 
 
-def central_slope(function: Callable[[float], np.ndarray], width: float = 1 / 32) -> np.ndarray:
+def central_slope(function: Callable[[float], np.ndarray], width: float) -> np.ndarray:
     """Derivative at 0 by central differences of order six, exact for polynomials of degree six.
 
     The energies of straight triangles are quartic along a step but for their angles.

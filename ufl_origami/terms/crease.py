@@ -79,9 +79,13 @@ class CreaseTerm(StencilTerm):
         np.add.at(out, self._dofs[used], moment[used])
 
     def refer(self, scalars: np.ndarray, factor: float) -> None:
-        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor."""
+        """Take edge unknowns (ns,) as stress-free, and the law's stiffness there times a factor.
+
+        Where the law's moment falls there is none.
+        """
         angle = self.edges.angle(scalars)
-        self.law = LinearLaw(factor * self._given(angle, self._time)[2], angle)
+        stiffness = np.maximum(self._given(angle, self._time)[2], 0.0)
+        self.law = LinearLaw(factor * stiffness, angle)
 
     def largest_turn(self, state: State, step: np.ndarray) -> float:
         """Largest change (radians) of the virtual fold angles over a step."""

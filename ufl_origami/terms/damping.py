@@ -4,6 +4,8 @@ In proportion to mass, alpha / (2 rate) |v|^2_M: force -alpha M v. In proportion
 times the elastic energy's quadratic form in the rates of strain, curvature and fold angle
 (Kelvin-Voigt): with e the strains, rate (e - e_base) their rates, it is the elastic energy of the
 strains e - e_base with beta rate times the stiffness. Rigid motion strains nothing and is free.
+A crease is damped in proportion to the stiffness of its law at the base; where its moment falls
+(a fold that snaps), not at all.
 """
 
 from collections.abc import Sequence
