@@ -55,6 +55,7 @@ _HOMES = {
     "at_position": "path_stops",
     "follow_branch": "branches",
     "follow_path": "paths",
+    "jump": "jumps",
     "landscape": "branches",
     "modes": "branches",
     "restore": "branches",

@@ -43,6 +43,11 @@ class Problem:
         return Tangent(self.configuration, self.terms)
 
     @property
+    def moment(self) -> float:
+        """Load factor or time at which terms and prescribed unknowns are taken."""
+        return self.time
+
+    @property
     def bounded(self) -> bool:
         """Whether a term's energy ends somewhere."""
         return any(term.bounded for term in self.terms)
@@ -61,11 +66,11 @@ class Problem:
         """Set loads, rest angles and prescribed normals to a load factor or time."""
         self.time = time
         for term in self.terms:
-            term.set_time(time)
+            term.set_time(self.moment)
 
     def state(self, vector: PETSc.Vec) -> State:
         """Local view of a vector of unknowns at the current time."""
-        return self.configuration.state(vector, self.time)
+        return self.configuration.state(vector, self.moment)
 
     def energies(self, vector: PETSc.Vec) -> dict[str, float]:
         """Energy by kind, summed over ranks."""
@@ -116,7 +121,7 @@ class Problem:
         """Gradient of the potential; on prescribed unknowns the distance from their values."""
         self.forces(vector, out)
         dofs = self.constraints.dofs
-        out.array_w[dofs] = vector.array_r[dofs] - self.constraints.values(self.time)
+        out.array_w[dofs] = vector.array_r[dofs] - self.constraints.values(self.moment)
 
     def linearise(self, previous: PETSc.Vec | None, current: PETSc.Vec) -> None:
         """Fix the stress of the next tangent (see Term.linearise)."""

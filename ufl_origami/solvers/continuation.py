@@ -15,16 +15,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ufl_origami.collective import reduced
 from ufl_origami.errors import BranchWarning, SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.bordered import Bordered, LoadFactor
+from ufl_origami.solvers.dynamics import sheet_size
 from ufl_origami.solvers.newton import NewtonSolver, area_weights
 from ufl_origami.solvers.stability import Mode, crossing_mode
 from ufl_origami.solvers.static import Check, Step
@@ -75,12 +74,8 @@ class Metric:
     """
 
     def __init__(self, problem: Problem):
-        configuration = problem.configuration
-        comm, rest = configuration.comm, configuration.sheet.rest
-        self.weights = area_weights(configuration, angles=False)
-        low = reduced(comm, rest.min(axis=0, initial=np.inf), MPI.MIN)
-        high = reduced(comm, rest.max(axis=0, initial=-np.inf), MPI.MAX)
-        self.diagonal = float(np.linalg.norm(high - low))
+        self.weights = area_weights(problem.configuration, angles=False)
+        self.diagonal = sheet_size(problem)
         self.weights.scale(3.0 / (self.weights.sum() * self.diagonal**2))
 
     def row(self, vector: PETSc.Vec) -> PETSc.Vec:

@@ -58,8 +58,9 @@ def nearest_modes(problem: Problem, x: PETSc.Vec, load: float, count: int) -> li
     problem.linearise(None, x)
     matrix = problem.stiffness(x)
     problem.constrain(matrix, None, None)
-    weights = PETSc.Mat().createDiagonal(shift_weights(problem))
-    weights.convert(PETSc.Mat.Type.AIJ)
+    weights = PETSc.Mat().createAIJ(matrix.getSizes(), nnz=1, comm=matrix.comm)
+    weights.setDiagonal(shift_weights(problem))
+    weights.assemble()
     solver = SLEPc.EPS().create(matrix.comm)
     try:
         return _solve(solver, matrix, weights, min(count, problem.configuration.size_global))
@@ -79,7 +80,8 @@ def _solve(solver: SLEPc.EPS, matrix: PETSc.Mat, weights: PETSc.Mat, count: int)
     solver.setTolerances(TOLERANCE, 200)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
-    options = {f"st_{name}": value for name, value in linear_options(symmetric=True).items()}
+    linear = linear_options(symmetric=True) | {"mat_mumps_icntl_13": 1, "mat_mumps_icntl_24": 1}
+    options = {f"st_{name}": value for name, value in linear.items()}
     with option_scope(PREFIX, options):
         solver.setFromOptions()
         solver.solve()
