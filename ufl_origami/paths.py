@@ -20,7 +20,9 @@ from ufl_origami.history import History, Record, Row, energy_columns, step_row
 from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model
 from ufl_origami.path_stops import PathStop, make_stops
+from ufl_origami.quality import warn_sagitta
 from ufl_origami.recording import Disk, Log, ProgressBar
+from ufl_origami.resolution import warn_round_off
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.continuation import ArcPath, ArcPoint, ArcSettings, Event, Stop
@@ -100,6 +102,10 @@ def follow_path(
         InputError: scene, stops or record are incomplete or wrong, or there is no such run to
             resume.
         OSError: a file could not be written.
+
+    Warns:
+        BranchWarning: a limit point or bifurcation was passed and could not be located.
+        MeshWarning, RoundOffWarning: as `solve_static` does.
     """
     if resume and output is None:
         raise InputError("resume: name the output folder of the run to resume")
@@ -129,7 +135,6 @@ def follow_path(
             log.observe()
             if disk:
                 disk.begin()
-                disk.observe()
         bar = stack.enter_context(closing(ProgressBar(model, [], progress, "load factor")))
         request = stack.enter_context(InterruptRequest())
 
@@ -144,7 +149,10 @@ def follow_path(
             if request.agreed(model.sheet.comm):
                 raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
 
-        path.run(measures, accept, turns)
+        if path.reason not in [*map(_text, wanted), path.turned(turns)] or not path.reason:
+            path.run(measures, accept, turns)
+    warn_sagitta(model)
+    warn_round_off(model)
     assert path.point is not None
     return PathResult(model, path.steps, log.history, path.events, path.point, path.reason)
 
@@ -218,6 +226,7 @@ class _PathRun:
             "steps": list(map(asdict, path.steps)),
             "size": path.size,
             "longest": path.longest,
+            "reason": path.reason,
             "events": [event_row(event) for event in path.events],
         }
 
@@ -233,6 +242,7 @@ class _PathRun:
         path.point = ArcPoint(self.model.x.copy(), load, arc, vectors["tangent"], slope, pivots)
         path.steps[:] = [Step(**step) for step in memory["steps"]]
         path.size, path.longest = memory["size"], memory["longest"]
+        path.reason = memory["reason"]
         path.events[:] = [_event(row) for row in memory["events"]]
 
 

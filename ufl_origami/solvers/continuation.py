@@ -20,7 +20,7 @@ from petsc4py import PETSc
 import numpy as np
 from scipy.optimize import brentq
 
-from ufl_origami.errors import BranchWarning, SolveError
+from ufl_origami.errors import BranchWarning, InputError, SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.bordered import Bordered, LoadFactor
 from ufl_origami.solvers.dynamics import sheet_size
@@ -64,6 +64,18 @@ class ArcSettings:
     tolerance: float = 1e-6
     steps: int = 1000
     locate: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that are none.
+
+        Raises:
+            InputError: naming the setting.
+        """
+        for name, value in vars(self).items():
+            if name != "locate" and not value > 0:
+                raise InputError(f"arc settings: {name} = {value} is not positive")
+        if self.growth < 1:
+            raise InputError(f"arc settings: growth {self.growth} is below 1")
 
 
 class Metric:
@@ -245,8 +257,16 @@ class ArcPath:
         point = self.point
         if point is None:
             raise ValueError("a path must be started before it is followed")
-        before = [stop.measure(point.x, point.load) for stop in stops]
         self.reason = ""
+        try:
+            self._follow(point, stops, on_accept, turns)
+        except BaseException:
+            self.problem.set_time((self.point or point).load)
+            raise
+        return self.steps
+
+    def _follow(self, point: ArcPoint, stops, on_accept, turns: int | None) -> None:
+        before = [stop.measure(point.x, point.load) for stop in stops]
         while not self.reason and len(self.steps) < self.settings.steps:
             begin = clock.perf_counter()
             self._iterations = self._factorisations = 0
@@ -265,16 +285,15 @@ class ArcPath:
             )
             self._adopt(new)
             before = [stop.measure(new.x, new.load) for stop in stops]
-            self.reason = stopped.reason if stopped else self._turned(turns)
+            self.reason = stopped.reason if stopped else self.turned(turns)
             self.steps.append(step)
             point = new
             if on_accept:
                 on_accept(step, new)
         self.reason = self.reason or f"{len(self.steps)} steps are done"
-        return self.steps
 
-    def _turned(self, turns: int | None) -> str:
-        """That there were enough limit points, or nothing."""
+    def turned(self, turns: int | None) -> str:
+        """That there were as many limit points as asked for, or nothing."""
         found = sum(event.kind == "limit point" for event in self.events)
         return f"{found} limit points" if turns is not None and found >= turns else ""
 
@@ -297,7 +316,6 @@ class ArcPath:
                 log.info("step of %g from load %g failed: %s", size, old.load, refused)
                 cuts, size = cuts + 1, 0.5 * size
                 if size < settings.shortest * self.longest:
-                    self.problem.set_time(old.load)
                     reasons = "; ".join([str(refused), *self.problem.suspicions(old.x)])
                     raise SolveError(
                         f"step below the shortest length: {reasons}", old.load
