@@ -97,14 +97,23 @@ class Problem:
         """Total potential energy, the loads' share included."""
         return sum(self.energies(vector).values())
 
-    def forces(self, vector: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Gradient of the potential without constraints; at a support this is the reaction."""
+    def forces(self, vector: PETSc.Vec, out: PETSc.Vec, since: float | None = None) -> None:
+        """Gradient of the potential without constraints; at a support this is the reaction.
+
+        Args:
+            vector: unknowns.
+            out: set to the gradient.
+            since: time of the unknowns, where they are the state from which a predictor starts.
+        """
         state = self.state(vector)
         out.set(0.0)
         norms = [0.0]
         for term in self.terms:
             local = np.zeros(self.configuration.num_local)
-            term.add_residual(state, local)
+            if since is None:
+                term.add_residual(state, local)
+            else:
+                term.add_forecast(state, since, local)
             part = self._part
             part.set(0.0)
             self.configuration.add_to_global(local, part)

@@ -264,9 +264,10 @@ class StaticPath:
         problem = self.problem
         matrix = problem.tangent.insert(problem.state(x))
         problem.constraints.check(target)
+        since = problem.time
         problem.set_time(target)
         rhs, known = x.duplicate(), x.duplicate()
-        problem.forces(x, rhs)
+        problem.forces(x, rhs, since)
         rhs.scale(-1.0)
         dofs = problem.constraints.dofs
         known.set(0.0)

@@ -79,6 +79,16 @@ class Term(ABC):
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the energy's gradient (or minus the force) to local values (num_local,)."""
 
+    def add_forecast(self, state: State, since: float, out: np.ndarray) -> None:
+        """Add the residual from which a predictor starts.
+
+        Args:
+            state: last accepted state, at the time to which the term is set.
+            since: time of that state; what ends somewhere is extrapolated from there.
+            out: local values (num_local,).
+        """
+        self.add_residual(state, out)
+
     def set_time(self, time: float) -> None:
         """Load factor or time to which loads, rest angles and prescribed normals are set."""
 

@@ -95,12 +95,9 @@ class ContactTerm(StencilTerm):
         self.configuration, self.functions, self.at = configuration, functions, at
         number, barrier = functions.number, at.surface.barrier
         x = ufl.SpatialCoordinate(functions.sheet.mesh) + functions.u - at.place
-        density = barrier_energy(
-            at.surface.obstacle.distance(x, number),
-            number(barrier.stiffness),
-            number(barrier.distance),
-        )
-        energy = at.sum.of(density)
+        reach = number(barrier.distance)
+        gap = at.sum.only_here(at.surface.obstacle.distance(x, number), reach)
+        energy = at.sum.of(barrier_energy(gap, number(barrier.stiffness), reach))
         self._form = NodalFormTerm(at.sum.here, "contact", functions, energy=energy)
         self.smallest = self._warned = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
@@ -158,6 +155,22 @@ class ContactTerm(StencilTerm):
         """Subtract the forces."""
         if self.near(state):
             self._form.add_residual(state, out)
+
+    def add_forecast(self, state: State, since: float, out: np.ndarray) -> None:
+        """Subtract the forces to first order in the obstacle's way, which may lead into the sheet.
+
+        They depend on where nodes are in its frame: its way is that of the nodes turned round.
+        """
+        now = state.time
+        way = np.asarray(self.at.surface.motion(now)) - self.at.surface.motion(since)
+        self.set_time(since)
+        self.add_residual(state, out)
+        if way.any():
+            (dofs,) = self.stencils()
+            blocks = [np.empty((*dofs.shape, 3))]
+            self.tangent(state, blocks)
+            np.add.at(out, dofs, -blocks[0] @ way)
+        self.set_time(now)
 
     def stencils(self) -> list[np.ndarray]:
         """The nodes that can touch."""
