@@ -10,13 +10,14 @@ from test_terms import remainders, skew_part
 from ufl_origami.barrier import Barrier
 from ufl_origami.configuration import State
 from ufl_origami.dynamics import solve_dynamic
-from ufl_origami.errors import InputError, SceneError
+from ufl_origami.errors import ContactWarning, InputError, SceneError, SolveError
 from ufl_origami.friction_laws import Coulomb
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.obstacles import Cylinder, Plane, SignedDistance, Sphere
 from ufl_origami.run import solve_static
 from ufl_origami.scene import Scene
+from ufl_origami.solvers.static import StepSettings
 
 
 def over(body, *, model="ddg", n=(3, 3), E=1e8, barrier=None, **options):
@@ -219,6 +220,23 @@ def test_static_press_moves_by_many_reaches_of_its_barrier_in_few_steps():
     assert 0 < result.model.contacts[0].smallest < barrier.distance
     assert result.model.position("x1y0")[2] == pytest.approx(way, abs=barrier.distance)
     assert len(result.steps) < 0.2 * way / barrier.distance
+
+
+def test_static_load_that_a_barrier_cannot_bear_is_an_error_at_the_last_state():
+    scene = Scene(rectangle(LENGTH, WIDTH, n=(10, 2)), STRIP)
+    scene.fix("x0")
+    scene.clamp("x0")
+    scene.line_load("x1", (0.0, 0.0, -5.0))
+    scene.obstacle("floor", Plane((0.0, 0.0, -0.05)), Barrier(1e-3, 1e-3))
+    made, times = build(scene), [0.0]
+    with (
+        pytest.warns(ContactWarning),
+        pytest.raises(SolveError, match=r"obstacle 'floor': its barrier .* too weak") as caught,
+    ):
+        steps = StepSettings(largest=0.03)
+        note = {"on_accept": lambda step, _: times.append(step.time)}
+        solve_static(made, [1.0], record=QUIET, steps=steps, **note)
+    assert caught.value.load_factor == made.problem.time == times[-1] > 0
 
 
 PLACES = {

@@ -138,6 +138,17 @@ def test_hard_steps_do_not_grow():
     assert sizes[50][1] == pytest.approx(0.01 * 1.5, rel=1e-12)
 
 
+def test_warning_of_a_step_made_an_error_comes_after_the_step_is_taken():
+    scene, seen = free_square("ddg"), []
+    scene.gravity((0.0, 0.0, -1.0))
+    model = uo.build(scene)
+    time = uo.TimeSettings(step=0.01, smallest=0.005, tolerance=1e-12)
+    note = {"on_accept": lambda step, _: seen.append(step.time)}
+    with pytest.raises(uo.AccuracyWarning, match="at the smallest step"):
+        uo.solve_dynamic(model, [0.02], time, scheme="implicit_euler", record=PLAIN, **note)
+    assert seen == [model.problem.time] == [0.005]
+
+
 def test_smallest_step_warns_and_goes_on():
     scene = free_square("ddg")
     scene.gravity((0.0, 0.0, -1.0))
@@ -174,6 +185,55 @@ def test_failed_step_leaves_the_last_state(settings, what):
     assert last
     assert caught.value.load_factor == model.problem.time == last[-1][0]
     assert (model.x.array_r == last[-1][1]).all()
+
+
+def shaken(error):
+    """Damped sheet between a clamped and a moved end, which something stops after time 0.25."""
+    sheet = rectangle(1.0, 0.25, n=(4, 1), comm=ALONE)
+    scene = uo.Scene(sheet, uo.Material(1e4, 0.3, 0.05, rho=1.0))
+    scene.clamp("x0")
+    scene.fix("x0")
+    scene.damping(mass=0.5, stiffness=0.01)
+    scene.obstacle("belt", uo.Plane((0.0, 0.0, -0.05)), uo.Barrier(1.0, 0.1), motion=drift)
+    scene.friction("belt", uo.Coulomb(0.3, eps=0.05))
+
+    def load(time):
+        if time > 0.25 and error is not uo.SolveError:
+            raise error("no load")
+        return 0.0, 0.0, 0.1 * time
+
+    def way(time):
+        return 0.01 * np.sin(5 * time) ** 2 if time < 0.25 else 0.5
+
+    scene.line_load("x1", load)
+    scene.move("x1", x=0.0, y=0.0, z=way)
+    return scene
+
+
+def drift(time):
+    return 0.1 * time, 0.0, 0.0
+
+
+def forces_at_the_ends(model):
+    return np.concatenate([model.reaction(name) for name in ("x0", "x1")])
+
+
+@pytest.mark.parametrize("error", [uo.SolveError, uo.InputError, KeyboardInterrupt])
+def test_what_a_step_raises_leaves_time_forces_and_energies_of_the_last_state(error):
+    model, last = uo.build(shaken(error)), {}
+
+    def note(step, model):
+        last.update(time=step.time, forces=forces_at_the_ends(model), energies=model.energies())
+
+    newton = uo.NewtonSettings(iterations=6, cycles=1)
+    with pytest.raises(error):
+        uo.solve_dynamic(model, [0.4], fixed(0.1), record=PLAIN, newton=newton, on_accept=note)
+    assert model.problem.time == last["time"] == pytest.approx(0.2)
+    assert model.energies() == last["energies"]
+    assert (forces_at_the_ends(model) == last["forces"]).all()
+    with pytest.raises(error):  # of a second motion the first step fails
+        uo.solve_dynamic(model, [0.4], fixed(0.1), record=PLAIN, newton=newton)
+    assert (forces_at_the_ends(model) == last["forces"]).all()
 
 
 @pytest.mark.parametrize(

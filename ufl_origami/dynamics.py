@@ -167,6 +167,7 @@ def _start(
         [at],
         Admissible(model),
         book,
+        rates=model.balance.rates if model.balance else None,
     )
     return _Run(path, model, book)
 

@@ -24,6 +24,7 @@ class Problem:
 
     Attributes:
         time: load factor or time to which the terms are set.
+        rates: those last handed to the terms, None in statics.
         force_scale: largest norm of one term's forces at the last evaluation of `forces`.
     """
 
@@ -34,6 +35,7 @@ class Problem:
         self.terms = list(terms)
         self.constraints = constraints
         self.time = 0.0
+        self.rates: Rates | None = None
         self.force_scale = 0.0
         self._part = configuration.create_vector()
 
@@ -166,6 +168,7 @@ class Problem:
 
     def begin_step(self, rates: Rates) -> None:
         """Hand the rates of a time step to the terms."""
+        self.rates = rates
         for term in self.terms:
             term.begin_step(rates)
 
@@ -197,3 +200,8 @@ class Problem:
         state = self.state(vector)
         for term in self.terms:
             term.accept(state)
+
+    def warn(self) -> None:
+        """Warn of what the last accepted state has shown; on all ranks."""
+        for term in self.terms:
+            term.warn()

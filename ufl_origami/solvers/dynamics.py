@@ -166,6 +166,7 @@ class TimePath:
         book: energy book, or None.
         number: number of accepted steps.
         size: size of the next step; None: the first one of the settings.
+        rates: those with which the last state was accepted; None: at a start.
     """
 
     problem: Problem
@@ -178,6 +179,8 @@ class TimePath:
     book: Book | None = None
     number: int = 0
     size: float | None = None
+    rates: Rates | None = None
+    _warning: str = ""
     _length: float = field(init=False)
     _mass: float = field(init=False)
 
@@ -200,6 +203,8 @@ class TimePath:
     def run(self, x: PETSc.Vec, stops: Sequence[float], on_accept: OnAccept | None = None) -> None:
         """Follow the motion through all stops.
 
+        Whatever a step raises, x and the terms' time and rates stay those of the last state.
+
         Args:
             x: unknowns of past[0]; those of the last accepted state on return.
             stops: increasing times to be hit exactly.
@@ -207,16 +212,31 @@ class TimePath:
 
         Raises:
             InputError: the stops do not increase, or are no multiples of a fixed step.
-            SolveError: a step below the smallest size (or a fixed one) failed; x is the last
-                accepted state.
+            SolveError: a step below the smallest size (or a fixed one) failed.
+
+        Warns:
+            AccuracyWarning: about an accepted state, once `on_accept` has seen it.
         """
         start = self.past[0].time
         self._check_stops(start, stops)
         for stop in stops:
             while self.past[0].time < stop - 1e-9 * self.settings.step:
-                step = self._advance(x, stop)
+                try:
+                    step = self._advance(x, stop)
+                except BaseException:
+                    self._return()
+                    raise
                 if on_accept:
                     on_accept(step, x)
+                if self._warning:
+                    warnings.warn(self._warning, AccuracyWarning, stacklevel=2)
+                self.problem.warn()
+
+    def _return(self) -> None:
+        """Set the terms back to the last accepted state."""
+        self.problem.set_time(self.past[0].time)
+        if self.rates:
+            self.problem.begin_step(self.rates)
 
     def _check_stops(self, start: float, stops: Sequence[float]) -> None:
         if any(later <= earlier for earlier, later in pairwise(stops)):
@@ -255,9 +275,8 @@ class TimePath:
             log.info("step to %g failed (%s), cut to %g", target, why, smaller)
             size = max(smaller, least)  # target - now differs from it by round-off
             target = now + size
-        if smaller is not None:
-            text = f"step to {target:g}: errors of {tried.excess:.2g} times the tolerance at the"
-            warnings.warn(f"{text} smallest step {size:g}", AccuracyWarning, stacklevel=3)
+        text = f"step to {target:g}: errors of {tried.excess:.2g} times the tolerance at the"
+        self._warning = f"{text} smallest step {size:g}" if smaller is not None else ""
         self._accept(x, tried)
         self.size = self._next_size(size, tried)
         return TimeStep(
@@ -279,12 +298,13 @@ class TimePath:
         tried.new.q.copy(x)
         self.problem.accept(x)
         self.past = [tried.new, *self.past[: self.scheme.memory - 1]]
+        self.rates = self.problem.rates
         self.number += 1
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
 
     def _give_up(self, why: str) -> None:
         time, settings = self.past[0].time, self.settings
-        self.problem.set_time(time)
+        self.problem.set_time(time)  # for the suspicions
         kind = "fixed step" if settings.fixed else "step of the smallest size"
         size = settings.step if settings.fixed else settings.least
         reasons = "; ".join([why, *self.problem.suspicions(self.past[0].q)])
@@ -349,7 +369,6 @@ class TimePath:
         try:
             return self.check(trial)
         except SolveError as error:
-            self.problem.set_time(self.past[0].time)
             raise SolveError(error.reason, self.past[0].time) from None
 
     def _error(self, new: Instant) -> float:

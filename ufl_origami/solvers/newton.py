@@ -16,7 +16,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_origami.configuration import MIDDLE
-from ufl_origami.errors import InputError, SolveError
+from ufl_origami.errors import InputError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
 from ufl_origami.solvers.options import option_scope
@@ -322,7 +322,7 @@ class NewtonSolver:
         try:
             snes.solve(None, x)
         except PETSc.Error as error:  # PETSc wraps what its callbacks raise
-            if isinstance(error.__cause__, SolveError):
+            if error.__cause__ is not None:
                 raise error.__cause__ from None
             raise
         self.report.iterations += snes.getIterationNumber()

@@ -101,7 +101,10 @@ class Term(ABC):
         """
 
     def begin_step(self, rates: Rates) -> None:
-        """Take over the rates of a time step that begins; statics has none."""
+        """Take over the rates of a time step that begins; statics has none.
+
+        After a step that failed, the rates of the last accepted step are handed over once more.
+        """
 
     def slope(self, state: State, step: np.ndarray) -> np.ndarray:
         """Derivatives (len(kinds),) of this rank's energies along a step from a state.
@@ -160,6 +163,9 @@ class Term(ABC):
 
     def accept(self, state: State) -> None:
         """Adopt a converged state as the branch against which angles are unwrapped."""
+
+    def warn(self) -> None:
+        """Warn of what the last accepted state has shown, once it is recorded; on all ranks."""
 
     def history(self) -> dict[str, Keyed]:
         """Values by name that a restart needs beside the unknowns."""

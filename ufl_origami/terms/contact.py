@@ -99,7 +99,7 @@ class ContactTerm(StencilTerm):
         gap = at.sum.only_here(at.surface.obstacle.distance(x, number), reach)
         energy = at.sum.of(barrier_energy(gap, number(barrier.stiffness), reach))
         self._form = NodalFormTerm(at.sum.here, "contact", functions, energy=energy)
-        self.smallest = self._warned = np.inf
+        self.smallest = self._gap = self._warned = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
         self._seen: tuple[np.ndarray, float] | None = None
 
@@ -234,18 +234,20 @@ class ContactTerm(StencilTerm):
         )
 
     def accept(self, state: State) -> None:
-        """Remember the smallest gap.
+        """Remember the smallest gap."""
+        self._gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
+        self.smallest = min(self.smallest, self._gap)
+
+    def warn(self) -> None:
+        """Warn where the last accepted gap is less than half of the last one warned of.
 
         Warns:
             ContactWarning: the gap is below a hundredth of the barrier's reach.
         """
-        gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
         reach = self.at.surface.barrier.distance
-        self.smallest = min(self.smallest, gap)
-        if gap > min(NEARLY_CLOSED * reach, 0.5 * self._warned):
+        if self._gap > min(NEARLY_CLOSED * reach, 0.5 * self._warned):
             return
-        self._warned = gap
-        if self.configuration.comm.rank == 0:
-            share = f"{100 * gap / reach:.2g} % of the barrier's distance"
-            text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
-            warnings.warn(text, ContactWarning, stacklevel=2)
+        self._warned = self._gap
+        share = f"{100 * self._gap / reach:.2g} % of the barrier's distance"
+        text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
+        warnings.warn(text, ContactWarning, stacklevel=2)
