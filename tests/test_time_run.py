@@ -10,6 +10,7 @@ import pytest
 from time_scenes import ALONE, LANDING, PLAIN, SHARP, fixed, free_square, landing, momenta, strip
 
 import ufl_origami as uo
+from ufl_origami.history import CsvFile
 
 STOPS = (0.12, 0.25)
 
@@ -77,6 +78,45 @@ def test_rare_checkpoints_hold_the_last_step_of_a_stopped_run(folder, whole):
     resumed = land(ALONE, folder, resume=True, record=rare)
     assert resumed.steps[0].number == 4
     assert bits(resumed.history) == bits(whole.history)
+
+
+@pytest.mark.mpi
+def test_a_full_disk_is_told_to_all_ranks_and_leaves_a_run_to_be_resumed(comm, folder, monkeypatch):
+    rare, written = dataclasses.replace(PLAIN, checkpoint=1e9), []
+    write = CsvFile.write
+
+    def fill_up(file, row):
+        written.append(row)
+        if len(written) == 4:
+            raise OSError(28, "No space left on device")
+        write(file, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CsvFile, "write", fill_up)
+        with pytest.raises(OSError, match="No space left"):
+            land(comm, folder, record=rare)
+    whole = land(comm)
+    resumed = land(comm, folder, resume=True, record=rare)
+    assert_close(resumed.history, whole.history, 1e-7)
+
+
+@pytest.mark.serial
+def test_a_step_that_could_not_be_recorded_is_left_out_of_the_checkpoint(folder, whole):
+    calls = []
+
+    def fails_late(model):
+        calls.append(model)
+        if len(calls) == 4:
+            raise uo.InputError("no figure")
+        return 0.0
+
+    rare = dataclasses.replace(PLAIN, checkpoint=1e9, extra={"figure": fails_late})
+    with pytest.raises(uo.InputError, match="no figure"):
+        land(ALONE, folder, record=rare)
+    resumed = land(ALONE, folder, resume=True, record=rare)
+    assert resumed.history["energy_total"] == pytest.approx(
+        whole.history["energy_total"], rel=1e-12
+    )
 
 
 def assert_close(history, reference, tolerance):
