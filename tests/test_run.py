@@ -343,6 +343,19 @@ def test_resume_refuses_another_scene(comm, folder):
 
 
 @pytest.mark.serial
+def test_refused_stops_leave_an_earlier_run_and_its_bounds_hold_when_resumed(folder):
+    options = {"output": folder, "record": Record(fields="none")}
+    solve_static(pull(MPI.COMM_SELF), [0.3], steps=StepSettings(first=0.15), **options)
+    for stops in ([0.5, 0.5], [0.0], [np.nan]):
+        with pytest.raises(InputError, match="stops"):
+            solve_static(pull(MPI.COMM_SELF), stops, **options)
+    short = StepSettings(largest=0.1)
+    resumed = solve_static(pull(MPI.COMM_SELF), [0.3, 0.6], resume=True, steps=short, **options)
+    assert resumed.history["load_factor"][-1] == 0.6
+    assert max(resumed.history["step_size"][2:]) <= 0.1001
+
+
+@pytest.mark.serial
 def test_incomplete_checkpoint_is_named(folder):
     options = {"output": folder, "record": Record(fields="none")}
     solve_static(pull(MPI.COMM_SELF), [0.1], **options)

@@ -146,6 +146,57 @@ def test_resume_on_another_number_of_ranks(comm, folder, whole, serial_first):
     comm.Barrier()
 
 
+@pytest.mark.serial
+def test_refused_stops_leave_an_earlier_run_on_disk(folder):
+    options = {"record": PLAIN, "output": folder}
+    uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), **options)
+    for stops in ([0.25], [0.1, 0.1], [float("nan")]):
+        with pytest.raises(uo.InputError, match="stop"):
+            uo.solve_dynamic(strip("ddg"), stops, fixed(0.1), **options)
+    resumed = uo.solve_dynamic(strip("ddg"), [0.2, 0.4], fixed(0.1), resume=True, **options)
+    assert resumed.history["time"] == pytest.approx(0.1 * np.arange(5))
+
+
+@pytest.mark.serial
+def test_runs_of_the_other_solver_are_not_resumed(folder):
+    static, moving = ({"record": PLAIN, "output": folder / name} for name in ("static", "moving"))
+    uo.solve_static(strip("ddg"), [1.0], **static)
+    uo.solve_dynamic(strip("ddg"), [0.1], fixed(0.1), **moving)
+    with pytest.raises(uo.InputError, match="run of solve_dynamic, not solve_static"):
+        uo.solve_static(strip("ddg"), [2.0], resume=True, **moving)
+    with pytest.raises(uo.InputError, match="run of solve_static, not solve_dynamic"):
+        uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), resume=True, **static)
+
+
+@pytest.mark.mpi
+def test_smallest_gap_outlives_a_restart(comm, folder):
+    """A square that flies off a floor is nearest to it at the start."""
+
+    def scene(ranks):
+        scene = free_square("ddg", ranks)
+        scene.obstacle("floor", uo.Plane((0.0, 0.0, -0.5)), uo.Barrier(1.0, 0.1))
+        scene.launch((0.0, 0.0, 1.0))
+        return scene
+
+    mine = folder if comm.rank == 0 else folder / "unused"
+    first = uo.solve_dynamic(scene(ALONE), [0.1], fixed(0.1), record=PLAIN, output=mine)
+    comm.Barrier()
+    options = {"record": PLAIN, "output": folder, "resume": True}
+    model = uo.solve_dynamic(scene(comm), [0.1, 0.4], fixed(0.1), **options).model
+    assert first.model.contacts[0].smallest == pytest.approx(0.6)
+    assert model.contacts[0].smallest == first.model.contacts[0].smallest
+
+
+@pytest.mark.serial
+def test_step_of_a_resumed_run_is_within_its_own_bounds(folder):
+    options = {"record": PLAIN, "output": folder}
+    scene = free_square("ddg")
+    uo.solve_dynamic(scene, [1.0], uo.TimeSettings(step=0.2), **options)
+    short = uo.TimeSettings(step=0.05, largest=0.1)
+    resumed = uo.solve_dynamic(free_square("ddg"), [2.0], short, resume=True, **options)
+    assert max(step.size for step in resumed.steps) <= 0.1 * (1 + 1e-6)
+
+
 def test_another_scheme_or_scene_is_not_resumed(comm, folder):
     options = {"record": PLAIN, "output": folder}
     uo.solve_dynamic(strip("ddg", comm), [0.1], fixed(0.1), **options)

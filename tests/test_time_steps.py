@@ -117,12 +117,22 @@ def test_fixed_steps_are_equal():
     ("stops", "message"),
     [
         ([0.2, 0.25], r"stop 0.25 is 2.5 fixed steps of 0.1 after 0: give a multiple"),
+        ([50.00002], r"stop 50 is 500.0002 fixed steps of 0.1 after 0"),
         ([0.2, 0.2], r"stops \[0.2, 0.2\] do not increase"),
+        ([0.2, float("nan")], r"stops \[0.2, nan\] are not finite"),
+        ([-0.1, 0.2], r"stops \[-0.1, 0.2\] are not after 0, where the model is"),
+        ([0.0], r"stops \[0.0\] are not after 0"),
     ],
 )
 def test_refused_stops(stops, message):
     with pytest.raises(uo.InputError, match=message):
         uo.solve_dynamic(free_square("ddg"), stops, fixed(0.1), record=PLAIN)
+
+
+@pytest.mark.parametrize("stops", [[float("nan")], [0.0], [0.5, 0.5]])
+def test_refused_load_factors(stops):
+    with pytest.raises(uo.InputError, match="stops"):
+        uo.solve_static(strip("ddg"), stops, record=PLAIN)
 
 
 def test_hard_steps_do_not_grow():
@@ -269,6 +279,78 @@ def test_refused_scenes():
             uo.solve_dynamic(jumping(start), [0.1], fixed(0.1))
     with pytest.raises(uo.InputError, match=r"'rk4' is none of \('implicit_euler', 'bdf2'\)"):
         uo.solve_dynamic(free_square("ddg"), [0.1], fixed(0.1), scheme="rk4")
+
+
+@pytest.mark.parametrize(
+    ("velocity", "message"),
+    [
+        (lambda rest: rest[:, :1], r"launch: expected velocities \(9, 3\), got \(9, 1\)"),
+        (lambda rest: rest[:4], r"launch: expected velocities \(9, 3\), got \(4, 3\)"),
+        (lambda rest: rest * np.nan, "launch: a velocity is not finite"),
+    ],
+)
+def test_refused_launches(velocity, message):
+    scene = free_square("ddg")
+    scene.launch(velocity)
+    with pytest.raises(uo.SceneError, match=message):
+        uo.solve_dynamic(scene, [0.1], fixed(0.1))
+
+
+@pytest.mark.mpi
+def test_launch_refused_on_one_rank_is_refused_on_all(comm):
+    def velocity(rest):
+        if comm.rank == comm.size - 1:
+            raise uo.InputError("no wind here")
+        return rest
+
+    scene = free_square("ddg", comm)
+    scene.launch(velocity)
+    with pytest.raises(uo.InputError, match="no wind here"):
+        uo.solve_dynamic(scene, [0.1], fixed(0.1))
+
+
+def clock(model):
+    return model.problem.time, model.load_factor.held, model.motion, model.energies()
+
+
+@pytest.mark.parametrize("what", ["launch", "stops", "record"])
+def test_refused_start_changes_nothing(what):
+    scene = strip("ddg")
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    if what == "launch":
+        scene.launch(lambda rest: rest[:1])
+    model = uo.solve_static(scene, [0.6], record=PLAIN).model
+    before = clock(model)
+    options = {"stops": [0.1], "record": PLAIN} | {
+        "launch": {},
+        "stops": {"stops": [-0.1]},
+        "record": {"record": uo.Record(points=["nowhere"])},
+    }[what]
+    with pytest.raises(uo.InputError):
+        uo.solve_dynamic(model, time=fixed(0.1), **options)
+    assert clock(model) == before
+
+
+def test_refused_static_path_leaves_the_motion():
+    model = uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), record=PLAIN).model
+    before = clock(model)
+    for refused in ({"stops": [0.5]}, {"stops": [2.0], "record": uo.Record(points=["nowhere"])}):
+        with pytest.raises(uo.InputError):
+            uo.solve_static(model, **refused)
+        assert clock(model) == before
+
+
+def test_static_path_after_a_motion_goes_on_at_the_load_factor_held():
+    scene = strip("ddg")
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    model = uo.solve_static(scene, [0.6], record=PLAIN).model
+    uo.solve_dynamic(model, [0.3], fixed(0.1), record=PLAIN)
+    result = uo.solve_static(model, [0.7], record=PLAIN)
+    assert result.steps[0].size == pytest.approx(0.1)
+    alone = strip("ddg")
+    alone.line_load("x1", (0.0, 0.0, 0.02))
+    reference = uo.solve_static(alone, [0.7], record=PLAIN).model
+    assert model.x.array_r == pytest.approx(reference.x.array_r, abs=1e-8)
 
 
 def test_supports_start_at_the_rate_of_their_motion():

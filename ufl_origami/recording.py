@@ -13,7 +13,7 @@ import time as clock
 from collections.abc import Sequence
 from math import floor
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from petsc4py import PETSc
 
@@ -35,7 +35,13 @@ COLLECTIVE_ERRORS = (SolveError, InputError, KeyboardInterrupt, OSError)
 
 
 class Run(Protocol):
-    """A run that can be written down after each row of its history."""
+    """A run that can be written down after each row of its history.
+
+    Attributes:
+        solver: name of the function whose run it is.
+    """
+
+    solver: ClassVar[str]
 
     @property
     def rows(self) -> int:
@@ -92,7 +98,9 @@ class Disk:
     def __init__(self, log: Log, folder: Path):
         self.log, self.run, self.folder = log, log.run, folder
         self.comm = log.model.sheet.comm
-        self._checkpoint = Checkpoint(log.model, folder / CHECKPOINT_FOLDER, log.run.terms)
+        self._checkpoint = Checkpoint(
+            log.model, folder / CHECKPOINT_FOLDER, log.run.terms, log.run.solver
+        )
         self._csv: CsvFile | None = None
         self._fields: FieldWriter | None = None
         self._written = self._saved = 0.0

@@ -10,7 +10,6 @@ import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from math import ceil, inf
 from typing import Any, Protocol
 
@@ -25,6 +24,7 @@ from ufl_origami.problem import Problem
 from ufl_origami.solvers.clearance import clear_start
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
 from ufl_origami.solvers.schemes import Formula, Instant, Scheme
+from ufl_origami.solvers.stops import require_stops
 from ufl_origami.terms.base import Rates
 from ufl_origami.terms.inertia import InertiaTerm
 
@@ -35,6 +35,9 @@ TOO_LARGE = 2.0
 
 SAFETY = 0.9
 """Share of the step that the local error would allow."""
+
+OFF_STEP = 1e-6
+"""Distance, over a fixed step, by which a stop may miss the end of one."""
 
 SHRINK = 0.2
 """Largest cut of a step at once."""
@@ -211,14 +214,13 @@ class TimePath:
             on_accept: called with each accepted step and its unknowns.
 
         Raises:
-            InputError: the stops do not increase, or are no multiples of a fixed step.
+            InputError: see `check_stops`.
             SolveError: a step below the smallest size (or a fixed one) failed.
 
         Warns:
             AccuracyWarning: about an accepted state, once `on_accept` has seen it.
         """
-        start = self.past[0].time
-        self._check_stops(start, stops)
+        self.check_stops(stops)
         for stop in stops:
             while self.past[0].time < stop - 1e-9 * self.settings.step:
                 try:
@@ -238,14 +240,19 @@ class TimePath:
         if self.rates:
             self.problem.begin_step(self.rates)
 
-    def _check_stops(self, start: float, stops: Sequence[float]) -> None:
-        if any(later <= earlier for earlier, later in pairwise(stops)):
-            raise InputError(f"stops {list(stops)} do not increase")
+    def check_stops(self, stops: Sequence[float]) -> None:
+        """Refuse stops that do not increase, or that fixed steps do not hit.
+
+        Raises:
+            InputError: the message names the stops.
+        """
+        require_stops(stops)
+        start, step = self.past[0].time, self.settings.step
         for stop in stops:
-            count = (stop - start) / self.settings.step
-            if self.settings.fixed and abs(count - round(count)) > 1e-6 * max(1.0, count):
+            count = (stop - start) / step
+            if self.settings.fixed and count > 0 and abs(count - round(count)) > OFF_STEP:
                 raise InputError(
-                    f"stop {stop:g} is {count:.6g} fixed steps of {self.settings.step:g} after "
+                    f"stop {stop:g} is {count:.10g} fixed steps of {step:g} after "
                     f"{start:g}: give a multiple, or let the step adapt"
                 )
 

@@ -13,16 +13,16 @@ import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.errors import BranchWarning, InputError, SolveError, StabilityWarning
+from ufl_origami.errors import BranchWarning, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.clearance import clear_start
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
+from ufl_origami.solvers.stops import require_stops
 
 log = logging.getLogger(__name__)
 
@@ -132,14 +132,13 @@ class StaticPath:
             on_accept: called with each accepted step and its unknowns.
 
         Raises:
-            InputError: the stops do not increase.
+            InputError: the stops are no increasing numbers.
             SolveError: a step below the smallest size failed.
 
         Warns:
             BranchWarning, StabilityWarning: about an accepted state, once `on_accept` has seen it.
         """
-        if any(later <= earlier for earlier, later in pairwise(stops)):
-            raise InputError(f"stops {list(stops)} do not increase")
+        require_stops(stops)
         time, size = start, self.size or self.settings.first
         self.newton.allowed = 0
         self._unstable = self._factor_at(x, time) or 0

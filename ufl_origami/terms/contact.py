@@ -16,7 +16,7 @@ from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.errors import ContactWarning, SolveError
 from ufl_origami.obstacles import Obstacle
-from ufl_origami.terms.base import StencilTerm
+from ufl_origami.terms.base import Keyed, StencilTerm
 from ufl_origami.terms.form import NodalFormTerm, SheetFunctions
 from ufl_origami.terms.gaps import Gaps
 from ufl_origami.terms.nodes import SparseSum, sparse_sum
@@ -251,3 +251,13 @@ class ContactTerm(StencilTerm):
         share = f"{100 * self._gap / reach:.2g} % of the barrier's distance"
         text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
         warnings.warn(text, ContactWarning, stacklevel=2)
+
+    def history(self) -> dict[str, Keyed]:
+        """Smallest gap, and the last one warned of; the same on all ranks."""
+        return {
+            "gaps": Keyed(np.zeros(1, dtype=np.int64), np.array([[self.smallest, self._warned]]))
+        }
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Go on from the gaps of an earlier run."""
+        self.smallest, self._warned = map(float, values["gaps"][0])
