@@ -7,13 +7,14 @@ from contact_scenes import QUIET, fixed, mean_velocity, plate
 from ufl_origami.barrier import Barrier
 from ufl_origami.discretise import build
 from ufl_origami.dynamics import solve_dynamic
-from ufl_origami.errors import ContactWarning, SolveError
+from ufl_origami.errors import ContactWarning, InputError, SolveError
 from ufl_origami.gallery import z_fold
 from ufl_origami.material import Material
 from ufl_origami.meshing import mesh_pattern
 from ufl_origami.obstacles import Box, Plane
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.dynamics import TimeSettings
+from ufl_origami.solvers.newton import NewtonSettings
 from ufl_origami.suggestions import suggest_barrier
 
 WALL = Box((0.0, 0.0, -0.011), (9.0, 9.0, 2e-3))  # its surface 0.01 below the sheet
@@ -47,6 +48,29 @@ def test_one_step_through_a_thin_wall_and_out_is_refused(make):
 def test_thin_wall_that_rises_fast_throws_the_plate_up():
     model = solve_dynamic(risen(), [0.1], TimeSettings(step=0.1), record=QUIET).model
     assert model.contacts[0].smallest > 0
+    assert mean_velocity(model)[2] == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"method": "l2"},
+        {"method": "cp"},
+        {"options": {"snes_linesearch_type": "l2"}},
+        {"options": {"snes_type": "newtontr"}},
+    ],
+)
+def test_solvers_that_go_beyond_a_shortened_step_are_refused(settings):
+    newton = NewtonSettings(**settings)
+    with pytest.raises(InputError, match="may step through an obstacle"):
+        solve_dynamic(risen(), [0.1], fixed(0.01), record=QUIET, newton=newton)
+
+
+@pytest.mark.parametrize("method", ["newton", "bt"])
+def test_methods_that_only_shorten_steps_do_not_pass_a_thin_wall(method):
+    newton = NewtonSettings(method=method)
+    sizes = TimeSettings(step=0.1)
+    model = solve_dynamic(risen(), [0.1], sizes, record=QUIET, newton=newton).model
     assert mean_velocity(model)[2] == pytest.approx(2.0, rel=0.05)
 
 

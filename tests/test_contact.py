@@ -10,12 +10,14 @@ from test_terms import remainders, skew_part
 from ufl_origami.barrier import Barrier
 from ufl_origami.configuration import State
 from ufl_origami.dynamics import solve_dynamic
-from ufl_origami.errors import InputError, SceneError
+from ufl_origami.errors import ContactWarning, InputError, SceneError, SolveError
+from ufl_origami.friction_laws import Coulomb
 from ufl_origami.material import Material
 from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.obstacles import Cylinder, Plane, SignedDistance, Sphere
 from ufl_origami.run import solve_static
 from ufl_origami.scene import Scene
+from ufl_origami.solvers.static import StepSettings
 
 
 def over(body, *, model="ddg", n=(3, 3), E=1e8, barrier=None, **options):
@@ -149,6 +151,34 @@ def test_steps_see_obstacles_move():
     assert contact.gap(State(model.state.q, model.state.x, 0.6)) == pytest.approx(-1.3)
 
 
+def test_no_part_of_a_step_that_is_not_finite_is_free():
+    contact = build(over(Plane((0.0, 0.0, -0.5)))).contacts[0]
+    here = np.zeros((len(contact.at.gaps), 3))
+    assert contact.at.gaps.free_part(here, here) == 1.0
+    for value in (np.nan, np.inf):
+        there = here.copy()
+        there[0, 2] = value
+        assert contact.at.gaps.free_part(here, there) == 0.0
+
+
+@both_models
+def test_forecast_is_the_force_to_first_order_in_the_obstacles_way(model):
+    scene = over(TOUCHED["sphere"], model=model, n=(2, 2), E=1e-9, barrier=WIDE)
+    scene.obstacles.clear()
+    scene.obstacle("body", TOUCHED["sphere"], WIDE, motion=lambda t: (0.3 * t, 0.1 * t, t))
+    made = disturb(build(scene), 0.05)
+    contact, state, left = made.contacts[0], made.state, []
+    steps = 0.02 * 0.5 ** np.arange(4)
+    for step in steps:
+        contact.set_time(step)
+        there = State(state.q, state.x, step)
+        right, guess = np.zeros_like(state.q), np.zeros_like(state.q)
+        contact.add_residual(there, right)
+        contact.add_forecast(there, 0.0, guess)
+        left.append(np.linalg.norm(guess - right))
+    assert np.polyfit(np.log(steps), np.log(left), 1)[0] == pytest.approx(2.0, abs=0.1)
+
+
 STRIP = Material(1e7, 0.0, 0.02)
 LENGTH, WIDTH = 1.0, 0.2
 EI = STRIP.bending_stiffness * WIDTH
@@ -181,6 +211,36 @@ def test_cantilever_pressed_up_at_its_end_bears_the_contact_force(body, model):
     assert force[0] / force[2] == pytest.approx(sideways, abs=2e-3)
 
 
+def test_static_press_moves_by_many_reaches_of_its_barrier_in_few_steps():
+    scene = Scene(rectangle(LENGTH, WIDTH, n=(10, 2)), STRIP)
+    scene.fix("x0")
+    scene.clamp("x0")
+    barrier, way = Barrier(2e5, 1e-4), 0.03
+    rise = {"motion": lambda s: (0.0, 0.0, way * s)}
+    scene.obstacle("press", Plane((0.0, 0.0, -0.5e-4)), barrier, on=["x1"], **rise)
+    result = solve_static(scene, [1.0], record=QUIET)
+    assert 0 < result.model.contacts[0].smallest < barrier.distance
+    assert result.model.position("x1y0")[2] == pytest.approx(way, abs=barrier.distance)
+    assert len(result.steps) < 0.2 * way / barrier.distance
+
+
+def test_static_load_that_a_barrier_cannot_bear_is_an_error_at_the_last_state():
+    scene = Scene(rectangle(LENGTH, WIDTH, n=(10, 2)), STRIP)
+    scene.fix("x0")
+    scene.clamp("x0")
+    scene.line_load("x1", (0.0, 0.0, -5.0))
+    scene.obstacle("floor", Plane((0.0, 0.0, -0.05)), Barrier(1e-3, 1e-3))
+    made, times = build(scene), [0.0]
+    with (
+        pytest.warns(ContactWarning),
+        pytest.raises(SolveError, match=r"obstacle 'floor': its barrier .* too weak") as caught,
+    ):
+        steps = StepSettings(largest=0.03)
+        note = {"on_accept": lambda step, _: times.append(step.time)}
+        solve_static(made, [1.0], record=QUIET, steps=steps, **note)
+    assert caught.value.load_factor == made.problem.time == times[-1] > 0
+
+
 PLACES = {
     "x1": lambda x: x[:, 0] > 1 - 1e-9,
     "x0y1": lambda x: x[:, 0] - x[:, 1] < 1e-9 - 1,
@@ -208,3 +268,19 @@ def test_places_that_cannot_touch_may_be_inside():
     assert result.model.contacts[0].smallest == pytest.approx(
         np.sqrt(1.0 + (0.5 - 1 / 3) ** 2) - 0.3
     )
+
+
+@both_models
+@pytest.mark.parametrize("lagged", [False, True])
+def test_nodes_that_cannot_touch_may_be_inside_beside_some_that_do(model, lagged):
+    """An edge at a gap of 0.1 rubs on a surface that the rest of the sheet is behind of."""
+    barrier = Barrier(1e4, 0.2)
+    scene = over(Plane((0.9, 0.0, 0.0), (1.0, 0.0, 0.0)), model=model, barrier=barrier, on=("x1",))
+    scene.friction("body", Coulomb(0.5, eps=1e-3), lagged=lagged)
+    scene.launch((0.0, 0.0, 1.0))
+    made = build(scene)
+    share, touched = forces(made.contacts[0], made), PLACES["x1"](nodes(made))
+    assert share[:, 0] == pytest.approx(areas(made) * barrier.pressure(0.1) * touched, rel=1e-12)
+    history = solve_dynamic(made, [1e-7], fixed(1e-7), record=QUIET).history
+    drag = 0.5 * share[:, 0].sum()
+    assert history["lost_friction"][-1] == pytest.approx(drag * 1e-7, rel=1e-3)

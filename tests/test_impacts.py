@@ -272,6 +272,20 @@ def test_gap_that_nearly_closes_gives_a_warning():
     assert 0.98 * smallest < said < 2.02 * smallest  # told again where it halves
 
 
+@pytest.mark.mpi
+def test_contact_warning_made_an_error_is_raised_on_all_ranks_with_its_step_taken():
+    scene, seen = plate(), []
+    for name in ("floor", "double floor"):
+        scene.obstacle(name, Plane((0.0, 0.0, -REACH)), Barrier(500.0, REACH))
+    scene.launch((0.0, 0.0, -1.0))
+    made, note = build(scene), {"on_accept": lambda step, _: seen.append(step.time)}
+    with pytest.raises(ContactWarning, match="obstacle 'floor'"):
+        solve_dynamic(made, [0.012], fixed(1e-4), record=QUIET, **note)
+    assert seen[-1] == made.problem.time
+    first, second = made.contacts
+    assert first.smallest == second.smallest < 0.01 * REACH
+
+
 def press(speed):
     """A plate at rest over a plane that rises."""
     scene = plate()

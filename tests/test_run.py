@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 from mpi4py import MPI
@@ -14,11 +15,21 @@ import dolfinx
 import h5py
 import numpy as np
 import pytest
-from run_scenes import PULL_STEPS, AtStep, crush, interrupt, pull, roll, run_pull, squeeze
+from run_scenes import (
+    PULL_STEPS,
+    PULL_STOPS,
+    AtStep,
+    crush,
+    interrupt,
+    pull,
+    roll,
+    run_pull,
+    squeeze,
+)
 
 import ufl_origami
 from ufl_origami.discretise import build
-from ufl_origami.errors import InputError, SolveError
+from ufl_origami.errors import BranchWarning, InputError, SolveError
 from ufl_origami.gallery import z_fold
 from ufl_origami.history import STEP_COLUMNS, Record, read_history
 from ufl_origami.material import Material
@@ -172,6 +183,55 @@ def test_killed_run_resumes_to_the_same_bits(folder, whole, place):
     assert len(list((folder / "checkpoint").iterdir())) == 2
 
 
+def failing(error=None):
+    """The pull with a load that cannot be had beyond half the load factor."""
+    scene = pull(MPI.COMM_SELF)
+
+    def load(time):
+        if error and time > 0.5:
+            raise error("no load")
+        return 0.0, 0.0, -time
+
+    scene.line_load("crease", load)
+    return scene
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("error", [InputError, KeyboardInterrupt])
+def test_what_a_step_raises_leaves_the_last_state_in_memory_and_on_disk(folder, error):
+    model, last = build(failing(error)), {}
+    options = {"output": folder, "record": Record(fields="none", checkpoint=1e9)}
+    options |= {"steps": PULL_STEPS}
+
+    def note(step, model):
+        last.update(time=step.time, energies=model.energies())
+
+    with pytest.raises(error, match="no load"):
+        solve_static(model, PULL_STOPS, on_accept=note, **options)
+    assert model.problem.time == last["time"] > 0
+    assert model.energies() == last["energies"]
+    resumed = solve_static(failing(), PULL_STOPS, resume=True, **options)
+    assert bits(resumed.history) == bits(
+        solve_static(failing(), PULL_STOPS, record=Record(fields="none"), steps=PULL_STEPS).history
+    )
+
+
+@pytest.mark.serial
+def test_a_warning_made_an_error_comes_after_its_state_is_recorded(folder):
+    options = {"record": Record(fields="none"), "steps": StepSettings(first=0.25)}
+    with pytest.raises(BranchWarning) as caught:
+        solve_static(squeeze(MPI.COMM_SELF), [1.0], output=folder, **options)
+    history = read_history(folder / "history.csv")
+    assert f"state at {history['load_factor'][-1]:g} was found far" in str(caught.value)
+    with pytest.warns(BranchWarning):
+        whole = solve_static(squeeze(MPI.COMM_SELF), [1.0], **options)
+    assert bits(history) == bits(whole.history)[: len(history)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BranchWarning)
+        resumed = solve_static(squeeze(MPI.COMM_SELF), [1.0], output=folder, resume=True, **options)
+    assert bits(resumed.history) == bits(whole.history)
+
+
 @pytest.mark.filterwarnings("ignore::ufl_origami.errors.BranchWarning")
 @pytest.mark.serial
 def test_resume_keeps_the_memory_of_the_guard(folder):
@@ -288,6 +348,19 @@ def test_resume_refuses_another_scene(comm, folder):
     with pytest.raises(InputError, match="position_A_x"):
         options["record"] = Record(points=["B"], fields="none")
         solve_static(pull(comm), [0.1], resume=True, **options)
+
+
+@pytest.mark.serial
+def test_refused_stops_leave_an_earlier_run_and_its_bounds_hold_when_resumed(folder):
+    options = {"output": folder, "record": Record(fields="none")}
+    solve_static(pull(MPI.COMM_SELF), [0.3], steps=StepSettings(first=0.15), **options)
+    for stops in ([0.5, 0.5], [0.0], [np.nan]):
+        with pytest.raises(InputError, match="stops"):
+            solve_static(pull(MPI.COMM_SELF), stops, **options)
+    short = StepSettings(largest=0.1)
+    resumed = solve_static(pull(MPI.COMM_SELF), [0.3, 0.6], resume=True, steps=short, **options)
+    assert resumed.history["load_factor"][-1] == 0.6
+    assert max(resumed.history["step_size"][2:]) <= 0.1001
 
 
 @pytest.mark.serial

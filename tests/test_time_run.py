@@ -10,6 +10,7 @@ import pytest
 from time_scenes import ALONE, LANDING, PLAIN, SHARP, fixed, free_square, landing, momenta, strip
 
 import ufl_origami as uo
+from ufl_origami.history import CsvFile
 from ufl_origami.solvers.schemes import ImplicitEuler
 
 STOPS = (0.12, 0.25)
@@ -126,6 +127,45 @@ def test_rare_checkpoints_hold_the_last_step_of_a_stopped_run(folder, whole):
     assert bits(resumed.history) == bits(whole.history)
 
 
+@pytest.mark.mpi
+def test_a_full_disk_is_told_to_all_ranks_and_leaves_a_run_to_be_resumed(comm, folder, monkeypatch):
+    rare, written = dataclasses.replace(PLAIN, checkpoint=1e9), []
+    write = CsvFile.write
+
+    def fill_up(file, row):
+        written.append(row)
+        if len(written) == 4:
+            raise OSError(28, "No space left on device")
+        write(file, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CsvFile, "write", fill_up)
+        with pytest.raises(OSError, match="No space left"):
+            land(comm, folder, record=rare)
+    whole = land(comm)
+    resumed = land(comm, folder, resume=True, record=rare)
+    assert_close(resumed.history, whole.history, 1e-7)
+
+
+@pytest.mark.serial
+def test_a_step_that_could_not_be_recorded_is_left_out_of_the_checkpoint(folder, whole):
+    calls = []
+
+    def fails_late(model):
+        calls.append(model)
+        if len(calls) == 4:
+            raise uo.InputError("no figure")
+        return 0.0
+
+    rare = dataclasses.replace(PLAIN, checkpoint=1e9, extra={"figure": fails_late})
+    with pytest.raises(uo.InputError, match="no figure"):
+        land(ALONE, folder, record=rare)
+    resumed = land(ALONE, folder, resume=True, record=rare)
+    assert resumed.history["energy_total"] == pytest.approx(
+        whole.history["energy_total"], rel=1e-12
+    )
+
+
 def assert_close(history, reference, tolerance):
     """Energies relative to the largest of them, positions to the sheet's size of 1."""
     assert history.columns == reference.columns
@@ -151,6 +191,57 @@ def test_resume_on_another_number_of_ranks(comm, folder, whole, serial_first):
         assert result.steps[0].number == 5
         assert_close(result.history, whole.history, 1e-7)
     comm.Barrier()
+
+
+@pytest.mark.serial
+def test_refused_stops_leave_an_earlier_run_on_disk(folder):
+    options = {"record": PLAIN, "output": folder}
+    uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), **options)
+    for stops in ([0.25], [0.1, 0.1], [float("nan")]):
+        with pytest.raises(uo.InputError, match="stop"):
+            uo.solve_dynamic(strip("ddg"), stops, fixed(0.1), **options)
+    resumed = uo.solve_dynamic(strip("ddg"), [0.2, 0.4], fixed(0.1), resume=True, **options)
+    assert resumed.history["time"] == pytest.approx(0.1 * np.arange(5))
+
+
+@pytest.mark.serial
+def test_runs_of_the_other_solver_are_not_resumed(folder):
+    static, moving = ({"record": PLAIN, "output": folder / name} for name in ("static", "moving"))
+    uo.solve_static(strip("ddg"), [1.0], **static)
+    uo.solve_dynamic(strip("ddg"), [0.1], fixed(0.1), **moving)
+    with pytest.raises(uo.InputError, match="run of solve_dynamic, not solve_static"):
+        uo.solve_static(strip("ddg"), [2.0], resume=True, **moving)
+    with pytest.raises(uo.InputError, match="run of solve_static, not solve_dynamic"):
+        uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), resume=True, **static)
+
+
+@pytest.mark.mpi
+def test_smallest_gap_outlives_a_restart(comm, folder):
+    """A square that flies off a floor is nearest to it at the start."""
+
+    def scene(ranks):
+        scene = free_square("ddg", ranks)
+        scene.obstacle("floor", uo.Plane((0.0, 0.0, -0.5)), uo.Barrier(1.0, 0.1))
+        scene.launch((0.0, 0.0, 1.0))
+        return scene
+
+    mine = folder if comm.rank == 0 else folder / "unused"
+    first = uo.solve_dynamic(scene(ALONE), [0.1], fixed(0.1), record=PLAIN, output=mine)
+    comm.Barrier()
+    options = {"record": PLAIN, "output": folder, "resume": True}
+    model = uo.solve_dynamic(scene(comm), [0.1, 0.4], fixed(0.1), **options).model
+    assert first.model.contacts[0].smallest == pytest.approx(0.6)
+    assert model.contacts[0].smallest == first.model.contacts[0].smallest
+
+
+@pytest.mark.serial
+def test_step_of_a_resumed_run_is_within_its_own_bounds(folder):
+    options = {"record": PLAIN, "output": folder}
+    scene = free_square("ddg")
+    uo.solve_dynamic(scene, [1.0], uo.TimeSettings(step=0.2), **options)
+    short = uo.TimeSettings(step=0.05, largest=0.1)
+    resumed = uo.solve_dynamic(free_square("ddg"), [2.0], short, resume=True, **options)
+    assert max(step.size for step in resumed.steps) <= 0.1 * (1 + 1e-6)
 
 
 def test_another_scheme_or_scene_is_not_resumed(comm, folder):

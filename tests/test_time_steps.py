@@ -117,12 +117,22 @@ def test_fixed_steps_are_equal():
     ("stops", "message"),
     [
         ([0.2, 0.25], r"stop 0.25 is 2.5 fixed steps of 0.1 after 0: give a multiple"),
+        ([50.00002], r"stop 50 is 500.0002 fixed steps of 0.1 after 0"),
         ([0.2, 0.2], r"stops \[0.2, 0.2\] do not increase"),
+        ([0.2, float("nan")], r"stops \[0.2, nan\] are not finite"),
+        ([-0.1, 0.2], r"stops \[-0.1, 0.2\] are not after 0, where the model is"),
+        ([0.0], r"stops \[0.0\] are not after 0"),
     ],
 )
 def test_refused_stops(stops, message):
     with pytest.raises(uo.InputError, match=message):
         uo.solve_dynamic(free_square("ddg"), stops, fixed(0.1), record=PLAIN)
+
+
+@pytest.mark.parametrize("stops", [[float("nan")], [0.0], [0.5, 0.5]])
+def test_refused_load_factors(stops):
+    with pytest.raises(uo.InputError, match="stops"):
+        uo.solve_static(strip("ddg"), stops, record=PLAIN)
 
 
 def test_hard_steps_do_not_grow():
@@ -134,6 +144,17 @@ def test_hard_steps_do_not_grow():
         history = uo.solve_dynamic(landing(), [0.12], time, record=PLAIN, newton=SHARP).history
         assert history["newton_iterations"][1] == 3
         assert history["step_size"][2] == pytest.approx(factor * 0.02, rel=1e-12)
+
+
+def test_warning_of_a_step_made_an_error_comes_after_the_step_is_taken():
+    scene, seen = free_square("ddg"), []
+    scene.gravity((0.0, 0.0, -1.0))
+    model = uo.build(scene)
+    time = uo.TimeSettings(step=0.01, smallest=0.005, tolerance=1e-12)
+    note = {"on_accept": lambda step, _: seen.append(step.time)}
+    with pytest.raises(uo.AccuracyWarning, match="at the smallest step"):
+        uo.solve_dynamic(model, [0.02], time, scheme="implicit_euler", record=PLAIN, **note)
+    assert seen == [model.problem.time] == [0.005]
 
 
 def test_smallest_step_warns_and_goes_on():
@@ -172,6 +193,55 @@ def test_failed_step_leaves_the_last_state(settings, what):
     assert last
     assert caught.value.load_factor == model.problem.time == last[-1][0]
     assert (model.x.array_r == last[-1][1]).all()
+
+
+def shaken(error):
+    """Damped sheet between a clamped and a moved end, which something stops after time 0.25."""
+    sheet = rectangle(1.0, 0.25, n=(4, 1), comm=ALONE)
+    scene = uo.Scene(sheet, uo.Material(1e4, 0.3, 0.05, rho=1.0))
+    scene.clamp("x0")
+    scene.fix("x0")
+    scene.damping(mass=0.5, stiffness=0.01)
+    scene.obstacle("belt", uo.Plane((0.0, 0.0, -0.05)), uo.Barrier(1.0, 0.1), motion=drift)
+    scene.friction("belt", uo.Coulomb(0.3, eps=0.05))
+
+    def load(time):
+        if time > 0.25 and error is not uo.SolveError:
+            raise error("no load")
+        return 0.0, 0.0, 0.1 * time
+
+    def way(time):
+        return 0.01 * np.sin(5 * time) ** 2 if time < 0.25 else 0.5
+
+    scene.line_load("x1", load)
+    scene.move("x1", x=0.0, y=0.0, z=way)
+    return scene
+
+
+def drift(time):
+    return 0.1 * time, 0.0, 0.0
+
+
+def forces_at_the_ends(model):
+    return np.concatenate([model.reaction(name) for name in ("x0", "x1")])
+
+
+@pytest.mark.parametrize("error", [uo.SolveError, uo.InputError, KeyboardInterrupt])
+def test_what_a_step_raises_leaves_time_forces_and_energies_of_the_last_state(error):
+    model, last = uo.build(shaken(error)), {}
+
+    def note(step, model):
+        last.update(time=step.time, forces=forces_at_the_ends(model), energies=model.energies())
+
+    newton = uo.NewtonSettings(iterations=6, cycles=1)
+    with pytest.raises(error):
+        uo.solve_dynamic(model, [0.4], fixed(0.1), record=PLAIN, newton=newton, on_accept=note)
+    assert model.problem.time == last["time"] == pytest.approx(0.2)
+    assert model.energies() == last["energies"]
+    assert (forces_at_the_ends(model) == last["forces"]).all()
+    with pytest.raises(error):  # of a second motion the first step fails
+        uo.solve_dynamic(model, [0.4], fixed(0.1), record=PLAIN, newton=newton)
+    assert (forces_at_the_ends(model) == last["forces"]).all()
 
 
 @pytest.mark.parametrize(
@@ -216,6 +286,78 @@ def test_a_jump_is_measured_by_the_sheet(side):
     uo.solve_dynamic(jumping(lambda time: 1e-10 * side, side), [], fixed(0.1), record=PLAIN)
     with pytest.raises(uo.SceneError, match="prescribed motion jumps by"):
         uo.solve_dynamic(jumping(lambda time: 1e-5 * side, side), [], fixed(0.1), record=PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "message"),
+    [
+        (lambda rest: rest[:, :1], r"launch: expected velocities \(9, 3\), got \(9, 1\)"),
+        (lambda rest: rest[:4], r"launch: expected velocities \(9, 3\), got \(4, 3\)"),
+        (lambda rest: rest * np.nan, "launch: a velocity is not finite"),
+    ],
+)
+def test_refused_launches(velocity, message):
+    scene = free_square("ddg")
+    scene.launch(velocity)
+    with pytest.raises(uo.SceneError, match=message):
+        uo.solve_dynamic(scene, [0.1], fixed(0.1))
+
+
+@pytest.mark.mpi
+def test_launch_refused_on_one_rank_is_refused_on_all(comm):
+    def velocity(rest):
+        if comm.rank == comm.size - 1:
+            raise uo.InputError("no wind here")
+        return rest
+
+    scene = free_square("ddg", comm)
+    scene.launch(velocity)
+    with pytest.raises(uo.InputError, match="no wind here"):
+        uo.solve_dynamic(scene, [0.1], fixed(0.1))
+
+
+def clock(model):
+    return model.problem.time, model.load_factor.held, model.motion, model.energies()
+
+
+@pytest.mark.parametrize("what", ["launch", "stops", "record"])
+def test_refused_start_changes_nothing(what):
+    scene = strip("ddg")
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    if what == "launch":
+        scene.launch(lambda rest: rest[:1])
+    model = uo.solve_static(scene, [0.6], record=PLAIN).model
+    before = clock(model)
+    options = {"stops": [0.1], "record": PLAIN} | {
+        "launch": {},
+        "stops": {"stops": [-0.1]},
+        "record": {"record": uo.Record(points=["nowhere"])},
+    }[what]
+    with pytest.raises(uo.InputError):
+        uo.solve_dynamic(model, time=fixed(0.1), **options)
+    assert clock(model) == before
+
+
+def test_refused_static_path_leaves_the_motion():
+    model = uo.solve_dynamic(strip("ddg"), [0.2], fixed(0.1), record=PLAIN).model
+    before = clock(model)
+    for refused in ({"stops": [0.5]}, {"stops": [2.0], "record": uo.Record(points=["nowhere"])}):
+        with pytest.raises(uo.InputError):
+            uo.solve_static(model, **refused)
+        assert clock(model) == before
+
+
+def test_static_path_after_a_motion_goes_on_at_the_load_factor_held():
+    scene = strip("ddg")
+    scene.line_load("x1", (0.0, 0.0, 0.02))
+    model = uo.solve_static(scene, [0.6], record=PLAIN).model
+    uo.solve_dynamic(model, [0.3], fixed(0.1), record=PLAIN)
+    result = uo.solve_static(model, [0.7], record=PLAIN)
+    assert result.steps[0].size == pytest.approx(0.1)
+    alone = strip("ddg")
+    alone.line_load("x1", (0.0, 0.0, 0.02))
+    reference = uo.solve_static(alone, [0.7], record=PLAIN).model
+    assert model.x.array_r == pytest.approx(reference.x.array_r, abs=1e-8)
 
 
 def test_supports_start_at_the_rate_of_their_motion():

@@ -24,7 +24,7 @@ from ufl_origami.model import Model
 from ufl_origami.shares import Finder, Shares
 from ufl_origami.terms.base import Keyed, Term
 
-FORMAT = 2
+FORMAT = 3
 MANIFEST = "manifest.json"
 ENERGY_TOLERANCE = 1e-9
 """Relative to the largest energy: a restored state differs by the order of summation alone."""
@@ -41,10 +41,11 @@ class Checkpoint:
         model: the model, whose current state is written or set.
         folder: made when the first checkpoint is written.
         terms: terms whose memories belong to the state.
+        solver: name of the function whose run it is.
     """
 
-    def __init__(self, model: Model, folder: str | Path, terms: Sequence[Term]):
-        self.model, self.folder = model, Path(folder)
+    def __init__(self, model: Model, folder: str | Path, terms: Sequence[Term], solver: str):
+        self.model, self.folder, self.solver = model, Path(folder), solver
         self.comm = model.sheet.comm
         self._shares = Shares(model, terms)
         self._identity = {"sheet": sheet_digest(model.sheet)} | declaration(model.scene)
@@ -74,6 +75,7 @@ class Checkpoint:
         _everywhere(self.comm, lambda: _write_part(self._part(number, self.comm.rank), shares))
         manifest = memory | {
             "format": FORMAT,
+            "solver": self.solver,
             "scene": self._identity,
             "time": self.model.problem.time,
             "number": number,
@@ -99,7 +101,7 @@ class Checkpoint:
             vectors: those that were written with it, to be set.
 
         Raises:
-            InputError: no checkpoint, one of another scene, or an incomplete one.
+            InputError: no checkpoint, one of another solver or scene, or an incomplete one.
         """
         manifest = self.comm.bcast(on_rank0(self.comm, self._read_manifest), root=0)
         self._require_same_scene(manifest["scene"])
@@ -119,6 +121,8 @@ class Checkpoint:
         manifest = json.loads(path.read_text())
         if manifest.get("format") != FORMAT:
             raise InputError(f"{path} has format {manifest.get('format')}, not {FORMAT}")
+        if manifest["solver"] != self.solver:
+            raise InputError(f"{path} is of a run of {manifest['solver']}, not {self.solver}")
         return manifest
 
     def _require_same_scene(self, stored: dict[str, str]) -> None:

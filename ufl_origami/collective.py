@@ -8,9 +8,12 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_origami.errors import InputError
+from ufl_origami.errors import InputError, SolveError
 
 T = TypeVar("T")
+
+ALIKE = (InputError, SolveError, OSError)
+"""Classes that all ranks raise where one of them did; of others the rest raise a RuntimeError."""
 
 
 def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
@@ -22,7 +25,7 @@ def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
 
     Raises:
         Exception: on rank 0 whatever the function raised; on the other ranks the same class with
-            the same message for the package's InputError classes, else a RuntimeError.
+            the same message for the classes of `ALIKE`, else a RuntimeError.
     """
     value, error = None, None
     if comm.rank == 0:
@@ -34,10 +37,7 @@ def on_rank0(comm: MPI.Comm, function: Callable[[], T]) -> T | None:
     if error is not None:
         raise error
     if told is not None:
-        kind, message = told
-        if issubclass(kind, InputError):
-            raise kind(message)
-        raise RuntimeError(f"rank 0 raised {kind.__name__}: {message}")
+        raise _told(*told)
     return value
 
 
@@ -50,7 +50,7 @@ def together(comm: MPI.Comm) -> Iterator[None]:
 
     Raises:
         Exception: where the block raised it; on the other ranks the same class with the same
-            message for the package's InputError classes, else a RuntimeError.
+            message for the classes of `ALIKE`, else a RuntimeError.
     """
     error: Exception | None = None
     try:
@@ -66,7 +66,7 @@ def together(comm: MPI.Comm) -> Iterator[None]:
 
 def _told(kind: type[Exception], message: str) -> Exception:
     """What a rank raises that is told of another rank's exception."""
-    if issubclass(kind, InputError):
+    if issubclass(kind, ALIKE):
         return kind(message)
     return RuntimeError(f"another rank raised {kind.__name__}: {message}")
 

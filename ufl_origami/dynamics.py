@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from petsc4py import PETSc
 
@@ -16,7 +17,7 @@ from ufl_origami.energy_book import EnergyBook
 from ufl_origami.errors import InputError, SceneError
 from ufl_origami.history import History, Record, Row, time_row
 from ufl_origami.interrupt import InterruptRequest
-from ufl_origami.model import Model
+from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.problem import Problem
 from ufl_origami.recording import Disk, Log, ProgressBar
 from ufl_origami.scene import Scene
@@ -24,6 +25,7 @@ from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep, sheet_size
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.schemes import Instant, Scheme, find_scheme
+from ufl_origami.solvers.stops import require_stops
 from ufl_origami.surroundings import damping_terms, make_motion
 from ufl_origami.terms.base import Term
 
@@ -95,8 +97,9 @@ def solve_dynamic(
         SolveError: a step failed at the smallest size; all accepted steps are on disk and the model
             is in the last accepted state.
         KeyboardInterrupt: after Ctrl-C; all accepted steps are on disk.
-        InputError: scene or record are incomplete or wrong, prescribed motion jumps at the start,
-            the sheet starts inside an obstacle, or there is no run of this scene to resume.
+        InputError: scene, record or stops are incomplete or wrong, prescribed motion jumps at the
+            start, the sheet starts inside an obstacle, or there is no run of this scene to resume;
+            model and output are as before.
         OSError: a file could not be written.
 
     Warns:
@@ -109,8 +112,13 @@ def solve_dynamic(
     model = scene if isinstance(scene, Model) else build(scene)
     record = record or Record()
     settings = newton or NewtonSettings(iterations=ITERATIONS, reuse=REUSE)
-    run = _start(model, time, find_scheme(scheme), settings, record)
-    log, steps = Log(model, record, run), []
+    steps: list[TimeStep] = []
+    with unchanged_where_refused(model):
+        run = _start(model, time, find_scheme(scheme), settings, record)
+        run.path.check_stops(stops)
+        if not resume:
+            require_stops(stops, model.problem.time)
+        log = Log(model, record, run)
     with ExitStack() as stack:
         stack.callback(run.path.newton.close)
         disk = None
@@ -167,6 +175,7 @@ def _start(
         [at],
         Admissible(model),
         book,
+        rates=model.balance.rates if model.balance else None,
     )
     return _Run(path, model, book)
 
@@ -218,6 +227,7 @@ def _sizes(model: Model) -> np.ndarray:
 class _Run:
     """A motion as it is recorded."""
 
+    solver: ClassVar[str] = "solve_dynamic"
     path: TimePath
     model: Model
     book: EnergyBook | None
@@ -291,7 +301,9 @@ class _Run:
             Instant(time, vectors[q] if q else self.model.x.copy(), vectors[v])
             for time, (q, v) in zip(memory["times"], named, strict=False)
         ]
-        path.number, path.size = memory["steps"], memory["size"]
+        settings, size = path.settings, memory["size"]
+        path.number = memory["steps"]
+        path.size = size and min(max(size, settings.least), settings.most)
         path.newton.shift = memory["shift"]
         path.problem.set_time(memory["time"])
         if self.book and memory["book"]:

@@ -1,6 +1,7 @@
 """The discrete model of a scene: unknowns, terms, constraints, and what it can measure."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -158,6 +159,22 @@ class FoldAngles:
     length: np.ndarray
     virtual: np.ndarray
     mesh: np.ndarray
+
+
+@contextmanager
+def unchanged_where_refused(model: Model) -> Iterator[None]:
+    """Give a model its time, load factor and motion back where the block raises."""
+    time, factor = model.problem.time, model.load_factor.held
+    motion, balance = model.motion, model.balance
+    rates = motion.v.copy() if motion else None
+    try:
+        yield
+    except BaseException:
+        model.load_factor.held, model.motion, model.balance = factor, motion, balance
+        if motion and rates:
+            rates.copy(motion.v)
+        model.problem.set_time(time)
+        raise
 
 
 def place_vertices(sheet: SheetMesh, name: str) -> np.ndarray:

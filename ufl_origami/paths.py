@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from petsc4py import PETSc
 
@@ -18,11 +18,12 @@ from ufl_origami.discretise import build
 from ufl_origami.errors import InputError
 from ufl_origami.history import History, Record, Row, energy_columns, step_row
 from ufl_origami.interrupt import InterruptRequest
-from ufl_origami.model import Model
+from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.path_stops import PathStop, make_stops
 from ufl_origami.quality import warn_sagitta
 from ufl_origami.recording import Disk, Log, ProgressBar
 from ufl_origami.resolution import warn_round_off
+from ufl_origami.run import end_motion
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.continuation import ArcPath, ArcPoint, ArcSettings, Event, Stop
@@ -115,17 +116,22 @@ def follow_path(
     model = scene if isinstance(scene, Model) else build(scene)
     if not model.scene.terms:
         check_supports(model)
-    model.load_factor.held = model.motion = model.balance = None
-    for term in model.contacts:
-        term.check(model.state)
-    solver = NewtonSolver(model.problem, newton or NewtonSettings())
-    path = ArcPath(model.problem, solver, arc or ArcSettings(), Admissible(model))
     record = record or Record()
-    log = Log(model, record, _PathRun(path, model, record))
+    measures = [Stop(_measure(model, stop), _text(stop)) for stop in wanted]
+    with unchanged_where_refused(model), ExitStack() as start:
+        end_motion(model)
+        for term in model.contacts:
+            term.check(model.state)
+        solver = NewtonSolver(model.problem, newton or NewtonSettings())
+        start.callback(solver.close)
+        path = ArcPath(model.problem, solver, arc or ArcSettings(), Admissible(model))
+        log = Log(model, record, _PathRun(path, model, record))
+        for measure in measures:
+            measure.measure(model.x, model.problem.time)
+        path.start(model.x.copy(), model.problem.time, towards)
+        start.pop_all()
     with ExitStack() as stack:
         stack.callback(solver.close)
-        path.start(model.x.copy(), model.problem.time, towards)
-        measures = [Stop(_measure(model, stop), _text(stop)) for stop in wanted]
         disk = None
         if output is not None:
             disk = stack.enter_context(Disk(log, Path(output)))
@@ -181,6 +187,7 @@ def _measure(model: Model, stop: PathStop) -> Callable[[PETSc.Vec, float], float
 class _PathRun:
     """A path as it is recorded."""
 
+    solver: ClassVar[str] = "follow_path"
     path: ArcPath
     model: Model
     record: Record
@@ -231,13 +238,7 @@ class _PathRun:
         }
 
     def recall(self, memory: Memory, vectors: dict[str, PETSc.Vec]) -> None:
-        """Take up the path.
-
-        Raises:
-            InputError: the folder has a run of another kind.
-        """
-        if "path" not in memory:
-            raise InputError("the run to resume is not a path by arc length")
+        """Take up the path."""
         path, (load, arc, slope, pivots) = self.path, memory["path"]
         path.point = ArcPoint(self.model.x.copy(), load, arc, vectors["tangent"], slope, pivots)
         path.steps[:] = [Step(**step) for step in memory["steps"]]

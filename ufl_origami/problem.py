@@ -24,6 +24,7 @@ class Problem:
 
     Attributes:
         time: load factor or time to which the terms are set.
+        rates: those last handed to the terms, None in statics.
         force_scale: largest norm of one term's forces at the last evaluation of `forces`.
     """
 
@@ -34,6 +35,7 @@ class Problem:
         self.terms = list(terms)
         self.constraints = constraints
         self.time = 0.0
+        self.rates: Rates | None = None
         self.force_scale = 0.0
         self._part = configuration.create_vector()
 
@@ -102,14 +104,23 @@ class Problem:
         """Total potential energy, the loads' share included."""
         return sum(self.energies(vector).values())
 
-    def forces(self, vector: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Gradient of the potential without constraints; at a support this is the reaction."""
+    def forces(self, vector: PETSc.Vec, out: PETSc.Vec, since: float | None = None) -> None:
+        """Gradient of the potential without constraints; at a support this is the reaction.
+
+        Args:
+            vector: unknowns.
+            out: set to the gradient.
+            since: time of the unknowns, where they are the state from which a predictor starts.
+        """
         state = self.state(vector)
         out.set(0.0)
         norms = [0.0]
         for term in self.terms:
             local = np.zeros(self.configuration.num_local)
-            term.add_residual(state, local)
+            if since is None:
+                term.add_residual(state, local)
+            else:
+                term.add_forecast(state, since, local)
             part = self._part
             part.set(0.0)
             self.configuration.add_to_global(local, part)
@@ -162,6 +173,7 @@ class Problem:
 
     def begin_step(self, rates: Rates) -> None:
         """Hand the rates of a time step to the terms."""
+        self.rates = rates
         for term in self.terms:
             term.begin_step(rates)
 
@@ -193,3 +205,8 @@ class Problem:
         state = self.state(vector)
         for term in self.terms:
             term.accept(state)
+
+    def warn(self) -> None:
+        """Warn of what the last accepted state has shown; on all ranks."""
+        for term in self.terms:
+            term.warn()

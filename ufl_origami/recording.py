@@ -13,7 +13,7 @@ import time as clock
 from collections.abc import Sequence
 from math import floor
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from petsc4py import PETSc
 
@@ -35,7 +35,13 @@ COLLECTIVE_ERRORS = (SolveError, InputError, KeyboardInterrupt, OSError)
 
 
 class Run(Protocol):
-    """A run that can be written down after each row of its history."""
+    """A run that can be written down after each row of its history.
+
+    Attributes:
+        solver: name of the function whose run it is.
+    """
+
+    solver: ClassVar[str]
 
     @property
     def rows(self) -> int:
@@ -92,11 +98,13 @@ class Disk:
     def __init__(self, log: Log, folder: Path):
         self.log, self.run, self.folder = log, log.run, folder
         self.comm = log.model.sheet.comm
-        self._checkpoint = Checkpoint(log.model, folder / CHECKPOINT_FOLDER, log.run.terms)
+        self._checkpoint = Checkpoint(
+            log.model, folder / CHECKPOINT_FOLDER, log.run.terms, log.run.solver
+        )
         self._csv: CsvFile | None = None
         self._fields: FieldWriter | None = None
         self._written = self._saved = 0.0
-        self._unsaved = False
+        self._unsaved: int | None = None  # rows on disk, where the checkpoint has fewer
 
     def begin(self) -> None:
         """Start afresh: an earlier run's history, fields and checkpoint are replaced."""
@@ -141,10 +149,11 @@ class Disk:
     def observe(self) -> None:
         """Write the state of an accepted step."""
         file, row = self._csv, self.log.history.rows[-1]
+        self._unsaved = None
         on_rank0(self.comm, lambda: file.write(row) if file else None)
         if self._fields and self._due():
             self._fields.write()
-        self._unsaved = True
+        self._unsaved = self.run.rows
         late = clock.monotonic() - self._saved >= self.log.record.checkpoint
         if self.comm.bcast(late, root=0):
             self._save()
@@ -157,14 +166,14 @@ class Disk:
 
     def _save(self) -> None:
         self._checkpoint.write(self.run.rows, self.run.memory(), self.run.vectors())
-        self._saved, self._unsaved = clock.monotonic(), False
+        self._saved, self._unsaved = clock.monotonic(), None
 
     def __enter__(self) -> "Disk":
         """Files are opened by `begin` or `resume`."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Write the last checkpoint and close the files.
+        """Write the last checkpoint, unless a step has no row, and close the files.
 
         Fields are closed by all ranks together: not after an error that one rank may have alone,
         which waiting for the others would hide.
@@ -172,7 +181,7 @@ class Disk:
         if self._csv:
             self._csv.close()
         together = kind is None or issubclass(kind, COLLECTIVE_ERRORS) or self.comm.size == 1
-        if self._unsaved and together:
+        if self._unsaved == self.run.rows and together:
             self._save()
         if self._fields and together:
             self._fields.close()

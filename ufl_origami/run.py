@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from petsc4py import PETSc
 
@@ -12,7 +13,7 @@ from ufl_origami.discretise import build
 from ufl_origami.errors import InputError
 from ufl_origami.history import History, Record, Row, energy_columns, step_row
 from ufl_origami.interrupt import InterruptRequest
-from ufl_origami.model import Model
+from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.quality import warn_sagitta
 from ufl_origami.recording import Disk, Log, ProgressBar
 from ufl_origami.resolution import warn_round_off
@@ -20,6 +21,7 @@ from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.newton import SHIFT_FACTOR, NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import StaticPath, Step, StepSettings
+from ufl_origami.solvers.stops import require_stops
 from ufl_origami.supports import check_supports
 from ufl_origami.terms.base import Term
 
@@ -56,7 +58,8 @@ def solve_static(
     The first Ctrl-C stops after the step under way is accepted, on all ranks; a second one at once.
 
     Args:
-        scene: a scene, or a model to be continued from its current state.
+        scene: a scene, or a model to be continued from its current state (after a motion at the
+            load factor that was held in it).
         stops: increasing load factors to be hit exactly.
         output: folder for history, fields and checkpoint (what an earlier run left there is
             replaced unless this run resumes it); None keeps the history in memory only.
@@ -73,8 +76,8 @@ def solve_static(
         SolveError: a step below the smallest size failed; all accepted steps are on disk and the
             model is in the last accepted state.
         KeyboardInterrupt: after Ctrl-C; all accepted steps are on disk.
-        InputError: scene or record are incomplete or wrong, or there is no run of this scene to
-            resume.
+        InputError: scene, record or stops are incomplete or wrong, or there is no run of this scene
+            to resume; model and output are as before.
         OSError: a file could not be written.
 
     Warns:
@@ -89,13 +92,15 @@ def solve_static(
     model = scene if isinstance(scene, Model) else build(scene)
     if not model.scene.terms:  # a term of the user's own may hold the sheet as well
         check_supports(model)
-    model.load_factor.held = model.motion = model.balance = None
-    for term in model.contacts:
-        term.check(model.state)
-    solver = NewtonSolver(model.problem, newton or NewtonSettings())
-    path = StaticPath(model.problem, solver, steps or StepSettings(), Admissible(model))
     record = record or Record()
-    log = Log(model, record, _StaticRun(path, model, record))
+    with unchanged_where_refused(model):
+        end_motion(model)
+        require_stops(stops, None if resume else model.problem.time)
+        for term in model.contacts:
+            term.check(model.state)
+        solver = NewtonSolver(model.problem, newton or NewtonSettings())
+        path = StaticPath(model.problem, solver, steps or StepSettings(), Admissible(model))
+        log = Log(model, record, _StaticRun(path, model, record))
     with ExitStack() as stack:
         stack.callback(solver.close)
         disk = None
@@ -121,10 +126,19 @@ def solve_static(
     return StaticResult(model, path.steps, log.history)
 
 
+def end_motion(model: Model) -> None:
+    """End a motion: the path goes on at the load factor that was held in it."""
+    if model.load_factor.held is not None:
+        start, model.load_factor.held = model.load_factor.held, None
+        model.problem.set_time(start)
+    model.motion = model.balance = None
+
+
 @dataclass(frozen=True)
 class _StaticRun:
     """A static path as it is recorded."""
 
+    solver: ClassVar[str] = "solve_static"
     path: StaticPath
     model: Model
     record: Record
@@ -162,4 +176,6 @@ class _StaticRun:
     def recall(self, memory: Memory, vectors: dict[str, PETSc.Vec]) -> None:
         """Take up solver and steps."""
         self.path.steps[:] = [Step(**step) for step in memory["steps"]]
-        self.path.size, self.path.newton.shift = memory["size"], memory["shift"]
+        size, largest = memory["size"], self.path.settings.largest
+        self.path.size = size and min(size, largest)
+        self.path.newton.shift = memory["shift"]

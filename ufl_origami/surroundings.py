@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from ufl_origami.attached import spread_body
+from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration
 from ufl_origami.errors import SceneError
 from ufl_origami.model import Model, place_nodes, place_vertices
@@ -73,18 +74,36 @@ def attached_masses(scene: Scene, configuration: Configuration) -> NodeMasses:
     return NodeMasses(np.vstack(dofs), np.concatenate(masses))
 
 
+def launch_velocity(scene: Scene, rest: np.ndarray) -> np.ndarray:
+    """Velocities (n, 3) at the start of nodes with places (n, 3) at rest.
+
+    Raises:
+        SceneError: on this rank: a function that does not give finite velocities.
+    """
+    velocity = np.zeros_like(rest)
+    for launch in scene.launches:
+        part = np.asarray(launch(rest) if callable(launch) else launch, dtype=float)
+        if part.shape not in ((3,), rest.shape):
+            raise SceneError(f"launch: expected velocities {rest.shape}, got {part.shape}")
+        if not np.isfinite(part).all():
+            raise SceneError("launch: a velocity is not finite")
+        velocity += part
+    return velocity
+
+
 def make_motion(scene: Scene, configuration: Configuration, functions: SheetFunctions) -> Motion:
-    """Masses of a scene, with the velocities at its start; collective."""
+    """Masses of a scene, with the velocities at its start; collective.
+
+    Raises:
+        SceneError: on all ranks, see `surface_density`, `attached_masses`, `launch_velocity`.
+    """
     matrix = mass_matrix(configuration, functions, surface_density(scene))
     extra = attached_masses(scene, configuration)
     diagonal = np.zeros(configuration.num_local)
     np.add.at(diagonal, extra.dofs, extra.masses[:, None])
     motion = Motion(configuration, functions, Mass(matrix + sparse.diags(diagonal, format="csr")))
-    rest = functions.V.tabulate_dof_coordinates()
-    velocity = np.zeros_like(rest)
-    for launch in scene.launches:
-        part = launch(rest) if callable(launch) else launch
-        velocity += np.broadcast_to(np.asarray(part, dtype=float), rest.shape)
+    with together(configuration.comm):
+        velocity = launch_velocity(scene, functions.V.tabulate_dof_coordinates())
     owned = configuration.owns(functions.dofs)
     places = configuration.owned_dofs(functions.dofs[owned])
     motion.v.array_w[places] = velocity.ravel()[owned]

@@ -10,7 +10,6 @@ import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from math import ceil, inf
 from typing import Any, Protocol
 
@@ -25,6 +24,7 @@ from ufl_origami.problem import Problem
 from ufl_origami.solvers.clearance import clear_start
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
 from ufl_origami.solvers.schemes import Formula, Instant, Scheme
+from ufl_origami.solvers.stops import require_stops
 from ufl_origami.terms.base import Rates
 from ufl_origami.terms.inertia import InertiaTerm
 
@@ -35,6 +35,9 @@ TOO_LARGE = 2.0
 
 SAFETY = 0.9
 """Share of the step that the local error would allow."""
+
+OFF_STEP = 1e-6
+"""Distance, over a fixed step, by which a stop may miss the end of one."""
 
 SHRINK = 0.2
 """Largest cut of a step at once."""
@@ -167,6 +170,7 @@ class TimePath:
         book: energy book, or None.
         number: number of accepted steps.
         size: size of the next step; None: the first one of the settings.
+        rates: those with which the last state was accepted; None: at a start.
     """
 
     problem: Problem
@@ -179,6 +183,8 @@ class TimePath:
     book: Book | None = None
     number: int = 0
     size: float | None = None
+    rates: Rates | None = None
+    _warning: str = ""
     _length: float = field(init=False)
     _mass: float = field(init=False)
 
@@ -201,32 +207,53 @@ class TimePath:
     def run(self, x: PETSc.Vec, stops: Sequence[float], on_accept: OnAccept | None = None) -> None:
         """Follow the motion through all stops.
 
+        Whatever a step raises, x and the terms' time and rates stay those of the last state.
+
         Args:
             x: unknowns of past[0]; those of the last accepted state on return.
             stops: increasing times to be hit exactly.
             on_accept: called with each accepted step and its unknowns.
 
         Raises:
-            InputError: the stops do not increase, or are no multiples of a fixed step.
-            SolveError: a step below the smallest size (or a fixed one) failed; x is the last
-                accepted state.
+            InputError: see `check_stops`.
+            SolveError: a step below the smallest size (or a fixed one) failed.
+
+        Warns:
+            AccuracyWarning: about an accepted state, once `on_accept` has seen it.
         """
-        start = self.past[0].time
-        self._check_stops(start, stops)
+        self.check_stops(stops)
         for stop in stops:
             while self.past[0].time < stop - 1e-9 * self.settings.step:
-                step = self._advance(x, stop)
+                try:
+                    step = self._advance(x, stop)
+                except BaseException:
+                    self._return()
+                    raise
                 if on_accept:
                     on_accept(step, x)
+                if self._warning:
+                    warnings.warn(self._warning, AccuracyWarning, stacklevel=2)
+                self.problem.warn()
 
-    def _check_stops(self, start: float, stops: Sequence[float]) -> None:
-        if any(later <= earlier for earlier, later in pairwise(stops)):
-            raise InputError(f"stops {list(stops)} do not increase")
+    def _return(self) -> None:
+        """Set the terms back to the last accepted state."""
+        self.problem.set_time(self.past[0].time)
+        if self.rates:
+            self.problem.begin_step(self.rates)
+
+    def check_stops(self, stops: Sequence[float]) -> None:
+        """Refuse stops that do not increase, or that fixed steps do not hit.
+
+        Raises:
+            InputError: the message names the stops.
+        """
+        require_stops(stops)
+        start, step = self.past[0].time, self.settings.step
         for stop in stops:
-            count = (stop - start) / self.settings.step
-            if self.settings.fixed and abs(count - round(count)) > 1e-6 * max(1.0, count):
+            count = (stop - start) / step
+            if self.settings.fixed and count > 0 and abs(count - round(count)) > OFF_STEP:
                 raise InputError(
-                    f"stop {stop:g} is {count:.6g} fixed steps of {self.settings.step:g} after "
+                    f"stop {stop:g} is {count:.10g} fixed steps of {step:g} after "
                     f"{start:g}: give a multiple, or let the step adapt"
                 )
 
@@ -256,9 +283,8 @@ class TimePath:
             log.info("step to %g failed (%s), cut to %g", target, why, smaller)
             size = max(smaller, least)  # target - now differs from it by round-off
             target = now + size
-        if smaller is not None:
-            text = f"step to {target:g}: errors of {tried.excess:.2g} times the tolerance at the"
-            warnings.warn(f"{text} smallest step {size:g}", AccuracyWarning, stacklevel=3)
+        text = f"step to {target:g}: errors of {tried.excess:.2g} times the tolerance at the"
+        self._warning = f"{text} smallest step {size:g}" if smaller is not None else ""
         self._accept(x, tried)
         self.size = self._next_size(size, tried)
         return TimeStep(
@@ -280,12 +306,13 @@ class TimePath:
         tried.new.q.copy(x)
         self.problem.accept(x)
         self.past = [tried.new, *self.past[: self.scheme.memory - 1]]
+        self.rates = self.problem.rates
         self.number += 1
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
 
     def _give_up(self, why: str) -> None:
         time, settings = self.past[0].time, self.settings
-        self.problem.set_time(time)
+        self.problem.set_time(time)  # for the suspicions
         kind = "fixed step" if settings.fixed else "step of the smallest size"
         size = settings.step if settings.fixed else settings.least
         reasons = "; ".join([why, *self.problem.suspicions(self.past[0].q)])
@@ -350,7 +377,6 @@ class TimePath:
         try:
             return self.check(trial)
         except SolveError as error:
-            self.problem.set_time(self.past[0].time)
             raise SolveError(error.reason, self.past[0].time) from None
 
     def _error(self, new: Instant) -> float:

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_origami.configuration import MIDDLE, Configuration
-from ufl_origami.errors import SolveError
+from ufl_origami.errors import InputError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
 from ufl_origami.solvers.options import option_scope
@@ -41,6 +41,9 @@ STAGNANT = 0.5
 CRITICAL = 5
 """Residuals evaluated along the step of an iteration that is part of a cycle."""
 
+SHORTENING = ("basic", "bt")
+"""Line searches that never go beyond the end of a Newton step."""
+
 MANY = 1e4
 """Unknowns above which the tolerance floor grows with the root of their number."""
 
@@ -53,7 +56,8 @@ class NewtonSettings:
 
     Attributes:
         method: "default" (full steps, MIP tangent, guard, watchdog), "newton" (plain full steps)
-            or one of SNES's line searches by name ("bt", "l2", "cp") with the plain tangent.
+            or one of SNES's line searches by name ("bt", "l2", "cp") with the plain tangent;
+            beside obstacles only "bt", the others go beyond steps that end before a surface.
         rtol: residual norm over the largest norm of one term's forces.
         iterations: full steps in one run.
         patience: first full steps of a run that the guard leaves alone: the extrapolated stress
@@ -110,6 +114,9 @@ class NewtonSolver:
         problem: terms and constraints.
         settings: method, tolerances and PETSc options.
 
+    Raises:
+        InputError: an energy that ends somewhere, and a method that does not stop before.
+
     Attributes:
         shift: last diagonal shift over the weights, 0 before the first one.
         report: what the solve under way did so far.
@@ -157,8 +164,10 @@ class NewtonSolver:
             snes.setLineSearchPreCheck(self._stop_before_bounds)
         if self.problem.conservative and line_search == "bt":
             snes.setObjective(lambda _, x: self.problem.potential(x))
-        with self._scope({"snes_linesearch_type": line_search}):
+        with self._scope({"snes_linesearch_type": line_search}) as options:
             snes.setFromOptions()
+            if self.problem.bounded:
+                require_shortening(snes, options.getString("snes_linesearch_type"))
             snes.getKSP().setOperators(matrix)
             snes.getKSP().pc.setOperators(matrix)
             snes.getKSP().pc.setFromOptions()
@@ -318,7 +327,7 @@ class NewtonSolver:
         try:
             snes.solve(None, x)
         except PETSc.Error as error:  # PETSc wraps what its callbacks raise
-            if isinstance(error.__cause__, SolveError):
+            if error.__cause__ is not None:
                 raise error.__cause__ from None
             raise
         self.report.iterations += snes.getIterationNumber()
@@ -392,6 +401,19 @@ class NewtonSolver:
     def _norm(self, x: PETSc.Vec) -> float:
         self.problem.residual(x, self._residual_vector)
         return self._residual_vector.norm()
+
+
+def require_shortening(snes: PETSc.SNES, line_search: str) -> None:
+    """Refuse a solver whose steps may lead beyond where `_stop_before_bounds` ends them.
+
+    Raises:
+        InputError: it is none of Newton's with a line search that only shortens.
+    """
+    if snes.getType() != PETSc.SNES.Type.NEWTONLS or line_search not in SHORTENING:
+        raise InputError(
+            f"solver {snes.getType()!r} with line search {line_search!r} may step through an "
+            f"obstacle: take 'newtonls' with one of {SHORTENING}"
+        )
 
 
 def shift_weights(problem: Problem) -> PETSc.Vec:

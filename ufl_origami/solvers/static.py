@@ -13,16 +13,16 @@ import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.errors import BranchWarning, InputError, SolveError, StabilityWarning
+from ufl_origami.errors import BranchWarning, SolveError, StabilityWarning
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.clearance import clear_start
 from ufl_origami.solvers.newton import NewtonReport, NewtonSolver
+from ufl_origami.solvers.stops import require_stops
 
 log = logging.getLogger(__name__)
 
@@ -116,11 +116,14 @@ class StaticPath:
     size: float | None = None
     _unstable: int = 0
     _effort: int = 0
+    _warnings: list[Warning] = field(default_factory=list)
 
     def run(
         self, x: PETSc.Vec, start: float, stops: Sequence[float], on_accept: OnAccept | None = None
     ) -> list[Step]:
         """Follow the path from an equilibrium at `start` through all stops.
+
+        Whatever a step raises, x and the problem's time stay those of the last accepted state.
 
         Args:
             x: unknowns at `start`; those of the last accepted state on return.
@@ -129,18 +132,24 @@ class StaticPath:
             on_accept: called with each accepted step and its unknowns.
 
         Raises:
-            InputError: the stops do not increase.
-            SolveError: a step below the smallest size failed; x is the last accepted state.
+            InputError: the stops are no increasing numbers.
+            SolveError: a step below the smallest size failed.
+
+        Warns:
+            BranchWarning, StabilityWarning: about an accepted state, once `on_accept` has seen it.
         """
-        if any(later <= earlier for earlier, later in pairwise(stops)):
-            raise InputError(f"stops {list(stops)} do not increase")
+        require_stops(stops)
         time, size = start, self.size or self.settings.first
         self.newton.allowed = 0
         self._unstable = self._factor_at(x, time) or 0
         for stop in stops:
             while time < stop - 1e-12 * max(1.0, abs(stop)):
                 target = stop if time + 1.001 * size >= stop else time + size
-                step = self._advance(x, time, target)
+                try:
+                    step = self._advance(x, time, target)
+                except BaseException:
+                    self.problem.set_time(time)
+                    raise
                 time = step.time
                 if target != stop or step.cuts:
                     size = step.size
@@ -149,6 +158,9 @@ class StaticPath:
                 self.size = size
                 if on_accept:
                     on_accept(step, x)
+                for warning in self._warnings:
+                    warnings.warn(warning, stacklevel=2)
+                self.problem.warn()
         return self.steps
 
     def _factor_at(self, x: PETSc.Vec, time: float) -> int | None:
@@ -172,7 +184,7 @@ class StaticPath:
             far = report.searched or report.strayed > self.settings.stray
             iterations += report.iterations
             factorisations += report.factorisations
-            why = self._refusal(trial, report)
+            why = self._refusal(trial, report, time)
             retreat = not hurried and cuts < 2 * self.settings.retreats
             if not why and retreat and far and not report.searched:
                 why = "the state found is further from the predicted one than the step is long"
@@ -191,22 +203,16 @@ class StaticPath:
                 continue
             log.info("step to %g failed (%s), cut to %g", target, why, size)
             if last or size < self.settings.smallest:
-                self.problem.set_time(time)
+                self.problem.set_time(time)  # for the suspicions
                 smallest = f"step below the smallest size {self.settings.smallest:g}"
                 reasons = "; ".join([why, *self.problem.suspicions(x)])
                 raise SolveError(f"{smallest}: {reasons}", time)
             target, cuts = time + size, cuts + 1
             self._factor_at(x, time)
-        trial.copy(x)
         self._effort = report.iterations
-        self.problem.accept(x)
-        if far:
-            text = f"state at {target:g} was found far from the predicted one: it may be on another"
-            warnings.warn(f"{text} branch; compare with smaller steps", BranchWarning, stacklevel=3)
         self.newton.report = NewtonReport()
         self.newton.allowed = 0
-        negative = self._factor_at(x, target)
-        self._unstable = negative or 0
+        negative = self._factor_at(trial, target)
         step = Step(
             number=len(self.steps) + 1,
             time=target,
@@ -217,18 +223,26 @@ class StaticPath:
             seconds=clock.perf_counter() - begin,
             cuts=cuts,
         )  # fmt: skip
+        trial.copy(x)
+        self.problem.accept(x)
         self.steps.append(step)
+        self._unstable = negative or 0
+        self._warnings = remarks(step, far=far)
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
-        if negative:
-            text = f"state at {target:g} is unstable: {negative} negative pivots of the tangent"
-            warnings.warn(text, StabilityWarning, stacklevel=3)
         return step
 
-    def _refusal(self, trial: PETSc.Vec, report: NewtonReport) -> str:
-        """Why a trial cannot be accepted, or an empty string."""
+    def _refusal(self, trial: PETSc.Vec, report: NewtonReport, time: float) -> str:
+        """Why a trial cannot be accepted, or an empty string.
+
+        Raises:
+            SolveError: for a reason that no shorter step can mend.
+        """
         if not report.converged:
             return report.reason
-        return self.check(trial) if self.check else ""
+        try:
+            return self.check(trial) if self.check else ""
+        except SolveError as error:
+            raise SolveError(error.reason, time) from None
 
     def _try(
         self, x: PETSc.Vec, time: float, target: float, *, search: bool
@@ -264,9 +278,10 @@ class StaticPath:
         problem = self.problem
         matrix = problem.tangent.insert(problem.state(x))
         problem.constraints.check(target)
+        since = problem.time
         problem.set_time(target)
         rhs, known = x.duplicate(), x.duplicate()
-        problem.forces(x, rhs)
+        problem.forces(x, rhs, since)
         rhs.scale(-1.0)
         dofs = problem.constraints.dofs
         known.set(0.0)
@@ -276,3 +291,20 @@ class StaticPath:
         step = x.duplicate()
         self.newton.linear.solve(rhs, step)
         return step
+
+
+def remarks(step: Step, *, far: bool) -> list[Warning]:
+    """What is to be told about an accepted state.
+
+    Args:
+        step: the step that led to it.
+        far: whether it was found far from the predicted one.
+    """
+    found: list[Warning] = []
+    if far:
+        text = f"state at {step.time:g} was found far from the predicted one: it may be on another"
+        found.append(BranchWarning(f"{text} branch; compare with smaller steps"))
+    if step.negative_pivots:
+        text = f"state at {step.time:g} is unstable: {step.negative_pivots} negative pivots"
+        found.append(StabilityWarning(f"{text} of the tangent"))
+    return found

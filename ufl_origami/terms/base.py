@@ -83,6 +83,16 @@ class Term(ABC):
     def add_residual(self, state: State, out: np.ndarray) -> None:
         """Add the energy's gradient (or minus the force) to local values (num_local,)."""
 
+    def add_forecast(self, state: State, since: float, out: np.ndarray) -> None:
+        """Add the residual from which a predictor starts.
+
+        Args:
+            state: last accepted state, at the time to which the term is set.
+            since: time of that state; what ends somewhere is extrapolated from there.
+            out: local values (num_local,).
+        """
+        self.add_residual(state, out)
+
     def set_time(self, time: float) -> None:
         """Load factor or time to which loads, rest angles and prescribed normals are set."""
 
@@ -95,7 +105,10 @@ class Term(ABC):
         """
 
     def begin_step(self, rates: Rates) -> None:
-        """Take over the rates of a time step that begins; statics has none."""
+        """Take over the rates of a time step that begins; statics has none.
+
+        After a step that failed, the rates of the last accepted step are handed over once more.
+        """
 
     def slope(self, state: State, step: np.ndarray) -> np.ndarray:
         """Derivatives (len(kinds),) of this rank's energies along a step from a state.
@@ -158,6 +171,9 @@ class Term(ABC):
 
     def accept(self, state: State) -> None:
         """Adopt a converged state as the branch against which angles are unwrapped."""
+
+    def warn(self) -> None:
+        """Warn of what the last accepted state has shown, once it is recorded; on all ranks."""
 
     def history(self) -> dict[str, Keyed]:
         """Values by name that a restart needs beside the unknowns."""

@@ -16,7 +16,7 @@ from ufl_origami.collective import together
 from ufl_origami.configuration import Configuration, State
 from ufl_origami.errors import ContactWarning, SolveError
 from ufl_origami.obstacles import Obstacle
-from ufl_origami.terms.base import StencilTerm
+from ufl_origami.terms.base import Keyed, StencilTerm
 from ufl_origami.terms.form import NodalFormTerm, SheetFunctions
 from ufl_origami.terms.gaps import Gaps
 from ufl_origami.terms.nodes import SparseSum, sparse_sum
@@ -95,14 +95,11 @@ class ContactTerm(StencilTerm):
         self.configuration, self.functions, self.at = configuration, functions, at
         number, barrier = functions.number, at.surface.barrier
         x = ufl.SpatialCoordinate(functions.sheet.mesh) + functions.u - at.place
-        density = barrier_energy(
-            at.surface.obstacle.distance(x, number),
-            number(barrier.stiffness),
-            number(barrier.distance),
-        )
-        energy = at.sum.of(density)
+        reach = number(barrier.distance)
+        gap = at.sum.only_here(at.surface.obstacle.distance(x, number), reach)
+        energy = at.sum.of(barrier_energy(gap, number(barrier.stiffness), reach))
         self._form = NodalFormTerm(at.sum.here, "contact", functions, energy=energy)
-        self.smallest = self._warned = np.inf
+        self.smallest = self._gap = self._warned = np.inf
         self._place = np.asarray(at.surface.motion(0.0), dtype=float)
         self._seen: tuple[np.ndarray, float] | None = None
 
@@ -158,6 +155,22 @@ class ContactTerm(StencilTerm):
         """Subtract the forces."""
         if self.near(state):
             self._form.add_residual(state, out)
+
+    def add_forecast(self, state: State, since: float, out: np.ndarray) -> None:
+        """Subtract the forces to first order in the obstacle's way, which may lead into the sheet.
+
+        They depend on where nodes are in its frame: its way is that of the nodes turned round.
+        """
+        now = state.time
+        way = np.asarray(self.at.surface.motion(now)) - self.at.surface.motion(since)
+        self.set_time(since)
+        self.add_residual(state, out)
+        if way.any():
+            (dofs,) = self.stencils()
+            blocks = [np.empty((*dofs.shape, 3))]
+            self.tangent(state, blocks)
+            np.add.at(out, dofs, -blocks[0] @ way)
+        self.set_time(now)
 
     def stencils(self) -> list[np.ndarray]:
         """The nodes that can touch."""
@@ -221,18 +234,30 @@ class ContactTerm(StencilTerm):
         )
 
     def accept(self, state: State) -> None:
-        """Remember the smallest gap.
+        """Remember the smallest gap."""
+        self._gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
+        self.smallest = min(self.smallest, self._gap)
+
+    def warn(self) -> None:
+        """Warn where the last accepted gap is less than half of the last one warned of.
 
         Warns:
             ContactWarning: the gap is below a hundredth of the barrier's reach.
         """
-        gap = self.configuration.comm.allreduce(self.gap(state), op=MPI.MIN)
         reach = self.at.surface.barrier.distance
-        self.smallest = min(self.smallest, gap)
-        if gap > min(NEARLY_CLOSED * reach, 0.5 * self._warned):
+        if self._gap > min(NEARLY_CLOSED * reach, 0.5 * self._warned):
             return
-        self._warned = gap
-        if self.configuration.comm.rank == 0:
-            share = f"{100 * gap / reach:.2g} % of the barrier's distance"
-            text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
-            warnings.warn(text, ContactWarning, stacklevel=2)
+        self._warned = self._gap
+        share = f"{100 * self._gap / reach:.2g} % of the barrier's distance"
+        text = f"{self.at.surface.label}: the gap closed to {share}: a stiffer one is due"
+        warnings.warn(text, ContactWarning, stacklevel=2)
+
+    def history(self) -> dict[str, Keyed]:
+        """Smallest gap, and the last one warned of; the same on all ranks."""
+        return {
+            "gaps": Keyed(np.zeros(1, dtype=np.int64), np.array([[self.smallest, self._warned]]))
+        }
+
+    def restore(self, values: dict[str, np.ndarray]) -> None:
+        """Go on from the gaps of an earlier run."""
+        self.smallest, self._warned = map(float, values["gaps"][0])

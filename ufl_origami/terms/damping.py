@@ -124,10 +124,15 @@ class ViscousShell(StencilTerm):
         start = elastic.strains(state)
         self._keys, self._past = start.keys, memory * [start.values]
         self._reference = start.values, 0.0
+        self._rates: Rates | None = None
+        self._accepted: tuple[Rates | None, tuple[np.ndarray, float]] = None, self._reference
 
     def begin_step(self, rates: Rates) -> None:
-        """Refer the strains to those of the last states."""
-        self._reference = _mean(rates.weights, self._past), self.beta * rates.rate
+        """Refer the strains to those of the last states, or of those before at the last rates."""
+        accepted, reference = self._accepted
+        if rates is not accepted:
+            reference = _mean(rates.weights, self._past), self.beta * rates.rate
+        self._rates, self._reference = rates, reference
         self._elastic.refer(*self._reference)
 
     def set_time(self, time: float) -> None:
@@ -169,6 +174,7 @@ class ViscousShell(StencilTerm):
     def accept(self, state: State) -> None:
         """Remember the strains of an accepted state."""
         self._elastic.accept(state)
+        self._accepted = self._rates, self._reference
         self._past = [self._elastic.strains(state).values, *self._past[:-1]]
 
     def history(self) -> dict[str, Keyed]:

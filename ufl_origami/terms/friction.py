@@ -91,9 +91,10 @@ def friction_form(
     u, place = (sliding.last, sliding.before) if lagged else (functions.u, at.place)
     number, barrier = functions.number, at.surface.barrier
     x = ufl.variable(ufl.SpatialCoordinate(functions.sheet.mesh) + u - place)
-    gap = at.surface.obstacle.distance(x, number)
-    normal = ufl.diff(gap, x)
-    pressure = barrier_pressure(gap, number(barrier.stiffness), number(barrier.distance))
+    distance, reach = at.surface.obstacle.distance(x, number), number(barrier.distance)
+    normal = ufl.diff(distance, x)
+    gap = total.only_here(distance, reach)
+    pressure = barrier_pressure(gap, number(barrier.stiffness), reach)
     velocity = sliding.rate * (functions.u - sliding.base) - sliding.belt
 
     def along(vector: Expr) -> Expr:

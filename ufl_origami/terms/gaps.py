@@ -114,10 +114,10 @@ class Gaps:
             end: those after the whole step.
 
         Returns:
-            The part; 0 where a gap is closed at the start.
+            The part; 0 where a gap is closed at the start, or the step is not finite.
         """
         gap, way = self.at(start), (end - start)[self._nodes]
-        if not (gap > 0).all():
+        if not ((gap > 0).all() and np.isfinite(way).all()):
             return 0.0
         steepest = (1 + STEEP) * np.linalg.norm(way, axis=1)
         floor, part = LEFT * gap, np.where(steepest <= (1 - LEFT) * gap, 1.0, 0.0)

@@ -40,6 +40,13 @@ class NodalSum:
         """The sum of a density per rest area (or of its pairing with a test function)."""
         return self.weight * density * self.measure
 
+    def only_here(self, value: Expr, elsewhere: Expr) -> Expr:
+        """A value at the nodes that take part (their weights are at least 1), else another one.
+
+        Zero weights do not silence what is not defined at the other nodes of their triangles.
+        """
+        return ufl.conditional(ufl.gt(self.weight, 0.5), value, elsewhere)
+
 
 @dataclass(frozen=True)
 class SparseSum(NodalSum):
