@@ -26,6 +26,7 @@ while (($#)); do
 done
 
 cd "$repo"
+export OMPI_MCA_mpi_yield_when_idle=1 # ranks that wait leave their cores to others
 serial=0
 python3 -m pytest "${workers[@]}" -m "$selection" "${arguments[@]}" || serial=$?
 # From 2 on pytest was interrupted, misused, or found no test: the second part would do the same.

@@ -2,14 +2,12 @@
 
 import csv
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_runs import run_demo
 from matplotlib.image import imread
 from run_scenes import crush
 from scenes import E, H, build, follow, z_fold_scene
@@ -211,14 +209,7 @@ def test_example_of_a_registered_scene_runs_as_it_stands(comm):
 
 
 def demo(folder, *words, ranks=1):
-    """Run the command in processes that are not taken for children of this one's launcher."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "cross_validate.py"), *words]
-    command += ["--output", str(folder)]
-    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300)
+    return run_demo("cross_validate", folder, *words, ranks=ranks)
 
 
 def table_of(folder):

@@ -1,15 +1,12 @@
 """The drop demo as a user runs it: its claims, files and figures, on one and two ranks."""
 
 import json
-import os
 import resource
-import subprocess
-import sys
 from math import cos, radians, sin, sqrt, tan
-from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_runs import run_demo
 from matplotlib.image import imread
 from PIL import Image
 
@@ -18,7 +15,6 @@ from ufl_origami.history import read_history
 
 pytestmark = pytest.mark.serial  # each test starts its own processes
 
-REPO = Path(__file__).resolve().parent.parent
 KEYS = (
     "model scheme dt steps cuts smallest_step triangles dofs seconds newton_iterations "
     "energy_balance_error energy_gain integrator_gain lost_integrator lost_damping lost_friction "
@@ -30,14 +26,7 @@ G, MASS = 9.81, 800.0 * 3e-4 * 2 * 0.08 * 0.10
 
 
 def demo(folder, *words, ranks=1):
-    """Run the demo; its processes must not take this process for their launcher's child."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "drop.py"), *words]
-    command += ["--output", str(folder)]
-    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=900)
+    return run_demo("drop", folder, *words, ranks=ranks, timeout=900)
 
 
 def only_run(done, folder):

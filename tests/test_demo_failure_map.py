@@ -2,15 +2,14 @@
 
 import csv
 import json
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from demo_runs import run_demo
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from scipy.integrate import solve_ivp
@@ -32,16 +31,7 @@ IN_TIME = ("impact", "block", "skid", "corner")
 
 
 def demo(folder, *words, ranks=1):
-    """Run the demo; its processes must not take this process for their launcher's child."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    env["OMPI_MCA_mpi_yield_when_idle"] = "1"  # the ranks may share cores with others
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "failure_map.py"), *words]
-    done = subprocess.run(
-        [*command, "--output", str(folder)], env=env, capture_output=True, text=True, timeout=600
-    )
+    done = run_demo("failure_map", folder, *words, ranks=ranks, timeout=600)
     assert done.returncode == 0, done.stderr
     return done
 

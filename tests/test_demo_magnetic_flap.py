@@ -1,13 +1,12 @@
 """The magnetic flap as a user runs it: its summary, files, film, and what its motion obeys."""
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_runs import run_demo
 from matplotlib.image import imread
 from PIL import Image
 from scipy.constants import mu_0
@@ -31,15 +30,7 @@ LARGEST_TORQUE = VOLUME * 0.1 * 0.01 / mu_0
 
 
 def demo(folder, *words, ranks=1):
-    """Run the demo; its processes must not take this process for their launcher's child."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    env["OMPI_MCA_mpi_yield_when_idle"] = "1"  # the ranks may share cores with others
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "magnetic_flap.py"), *words]
-    command += ["--output", str(folder)]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=600)
+    done = run_demo("magnetic_flap", folder, *words, ranks=ranks, timeout=600)
     assert done.returncode == 0, done.stderr
     return done.stdout, json.loads((folder / "summary.json").read_text())["runs"]
 

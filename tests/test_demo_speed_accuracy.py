@@ -1,14 +1,12 @@
 """The speed-accuracy demo as a user runs it, in its quick form: points, orders, text, charts."""
 
 import json
-import os
-import subprocess
-import sys
 from dataclasses import asdict, fields
 from math import exp, log
 from pathlib import Path
 
 import pytest
+from demo_runs import run_demo
 from matplotlib.image import imread
 
 from ufl_origami.recommendation import TABLE
@@ -35,14 +33,7 @@ CURVES = {
 
 
 def demo(folder, *words, ranks=1):
-    """Run the demo; its processes must not take this process for their launcher's child."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "speed_accuracy.py"), *words]
-    command += ["--output", str(folder)]
-    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300)
+    return run_demo("speed_accuracy", folder, *words, ranks=ranks)
 
 
 @pytest.fixture(scope="module")

@@ -1,20 +1,17 @@
 """What demos share: options, summary, arrays gathered on rank 0, the end of a failing run."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_runs import run_python
 from scenes import build, follow, z_fold_scene
 
 from ufl_origami.demo import print_table, read_options, write_summary
 from ufl_origami.gather import gather_fold_angles, gather_profile, gather_sheet
 from ufl_origami.run import solve_static
 
-REPO = Path(__file__).resolve().parent.parent
 DEFAULTS = {"model": "ddg", "bending": ("director", "averaged"), "eta": (0.1, 1.0), "h": 0.01}
 
 
@@ -161,24 +158,15 @@ MPI.COMM_WORLD.Barrier()
 """
 
 
-def run_python(code, *, ranks=1):
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    kept |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    kept["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, "-c", code]
-    return subprocess.run(command, env=kept, capture_output=True, text=True, timeout=60)
-
-
 @pytest.mark.serial
 def test_wrong_input_ends_in_one_line():
-    done = run_python(FAILING.format(kind="SceneError"))
+    done = run_python("-c", FAILING.format(kind="SceneError"))
     assert done.returncode == 1 and done.stderr == "-c: crease 'c' is missing\n"
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize("kind", ["SolveError", "SceneError"])
 def test_a_rank_that_fails_alone_ends_the_run(kind):
-    done = run_python(FAILING.format(kind=kind), ranks=2)
+    done = run_python("-c", FAILING.format(kind=kind), ranks=2)
     assert done.returncode != 0
     assert "crease 'c' is missing" in done.stderr

@@ -1,21 +1,17 @@
 """The Z-fold demo as a user runs it: its summary, files and figures, on one and two ranks."""
 
 import json
-import os
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_runs import run_demo
 from matplotlib.image import imread
 
 from ufl_origami.history import read_history
 
 pytestmark = pytest.mark.serial  # each test starts its own processes
 
-REPO = Path(__file__).resolve().parent.parent
 KEYS = (
     "model bending eta d1 nu h size triangles dofs fold_angle_deg fold_angle_mid_deg force energy "
     "energy_membrane energy_bending energy_crease newton_iterations seconds"
@@ -24,14 +20,7 @@ ELASTICA_KEYS = ["elastica_fold_angle_deg", "elastica_force"]
 
 
 def demo(folder, *words, ranks=1):
-    """Run the demo; its processes must not take this process for their launcher's child."""
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "PRTE_", "OMPI_"))}
-    env |= {k: v for k, v in os.environ.items() if k.startswith(("OMPI_ALLOW", "OMPI_MCA_btl"))}
-    env["PYTHONPATH"] = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    mpirun = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*mpirun, sys.executable, str(REPO / "demos" / "zfold_tension.py"), *words]
-    command += ["--output", str(folder)]
-    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=300)
+    return run_demo("zfold_tension", folder, *words, ranks=ranks)
 
 
 def summary(done, folder):

@@ -1,9 +1,5 @@
 """The fem model gives the same answer on any number of ranks."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 from mpi4py import MPI
 
 import numpy as np
@@ -80,18 +76,6 @@ def test_ranks_together_and_one_rank_alone_give_the_same_answer(name):
     assert len(counts[0]) == len(counts[1])
     assert np.abs(np.subtract(*counts)).max() <= 1
     assert [s.negative_pivots for s in path.steps] == [s.negative_pivots for s in path_alone.steps]
-
-
-@pytest.mark.slow
-@pytest.mark.serial
-def test_three_ranks_agree_too():
-    test = (
-        f"{Path(__file__)}::{test_ranks_together_and_one_rank_alone_give_the_same_answer.__name__}"
-    )
-    command = ["mpirun", "-n", "3", sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run([*command, test], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout[-2000:]
-    assert f"{len(MODELS)} passed" in done.stdout
 
 
 @pytest.mark.mpi

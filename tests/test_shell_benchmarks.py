@@ -64,7 +64,8 @@ def test_coarse_hemisphere(structure):
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_coarse_cylinder_snaps_through(structure):
     """The free end's flattening snaps back near half the load."""
-    steps, exact, _ = solve(cylinder_pullout(24, Form(structure)))
+    n = 20 if structure == "crisscross" else 24  # twice as many triangles for each
+    steps, exact, _ = solve(cylinder_pullout(n, Form(structure)))
     assert_stable(steps, cuts=20)  # those of the snap, of which a warning tells
     assert max(exact.values()) < 0.02
 

@@ -1,8 +1,6 @@
 """Runs in time: stopped and resumed, on several ranks, continued."""
 
 import dataclasses
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -272,15 +270,6 @@ def test_ranks_together_and_one_rank_alone_move_alike(comm, whole, model):
         shared.model.sheet.input_vertex.tolist(), shared.model.state.x, strict=True
     ):
         assert place == pytest.approx(reference[vertex], abs=1e-7)
-
-
-@pytest.mark.serial
-def test_three_ranks_move_alike_too():
-    test = f"{Path(__file__)}::{test_ranks_together_and_one_rank_alone_move_alike.__name__}[ddg]"
-    command = ["mpirun", "-n", "3", sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run([*command, test], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout[-2000:]
-    assert "1 passed" in done.stdout
 
 
 def bent():
