@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_paths import E, truss
+from path_scenes import E, truss
 
 import ufl_origami as uo
 

@@ -7,25 +7,11 @@ apex sways at w^2 = w0^2 - 2 a^2.
 
 import numpy as np
 import pytest
+from path_scenes import truss
 
 import ufl_origami as uo
 
 pytestmark = pytest.mark.mpi
-
-E = 1e4
-
-
-def truss(height, *, h, depth, model="ddg", n=1):
-    """Two panels over a span of 2 with hinges, whose limit load is that of factor 1."""
-    length = np.hypot(1.0, height)
-    pattern = uo.gallery.z_fold(length, depth, 2 * np.degrees(np.arctan2(1.0, height)))
-    scene = uo.Scene(uo.mesh_pattern(pattern, size=length / n), uo.Material(E, 0.0, h), model=model)
-    scene.crease("crease", 0.0)
-    scene.fix("left_edge")
-    scene.fix("right_edge")
-    limit = E * h * (height / length) ** 3 * 2 / (3 * np.sqrt(3.0))
-    scene.line_load("crease", (0.0, 0.0, limit))
-    return scene
 
 
 @pytest.mark.parametrize("model", ["ddg", "fem"])

@@ -70,6 +70,7 @@ def restore(model: Model, event: Event) -> None:
     if event.x is None:
         raise InputError(f"the state of the {event.kind} at {event.load:g} was not kept: resumed")
     event.x.copy(model.x)
+    model.problem.recall(event.memory)
     model.problem.set_time(event.load)
     model.problem.accept(model.x)
 

@@ -206,6 +206,16 @@ class Problem:
         for term in self.terms:
             term.accept(state)
 
+    def memory(self) -> list[dict[str, np.ndarray]]:
+        """What each term remembers of the accepted state, for `recall` on the same ranks."""
+        histories = [term.history() for term in self.terms]
+        return [{name: kept.values.copy() for name, kept in h.items()} for h in histories]
+
+    def recall(self, memory: list[dict[str, np.ndarray]]) -> None:
+        """Take back a memory, before a state near the one of then is accepted."""
+        for term, values in zip(self.terms, memory, strict=True):
+            term.restore({name: kept.copy() for name, kept in values.items()})
+
     def warn(self) -> None:
         """Warn of what the last accepted state has shown; on all ranks."""
         for term in self.terms:

@@ -143,6 +143,7 @@ class Event:
         after: negative pivots after it.
         x: unknowns; None where a resumed run has forgotten them.
         mode: the critical eigenvector, of length 1 by the path's metric; None where there is none.
+        memory: branches of angles of the accepted state before, from which `x` counts its own.
     """
 
     kind: str
@@ -152,6 +153,7 @@ class Event:
     after: int | None
     x: PETSc.Vec | None
     mode: PETSc.Vec | None = None
+    memory: list[dict[str, np.ndarray]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -438,7 +440,8 @@ class ArcPath:
         at, low, high = points[size], _count(old, new, min), _count(old, new, max)
         rises = _count(old, new, lambda a, b: a) == low
         before, after = (low, high) if rises else (high, low)
-        return Event("limit point", at.load, at.arc, before, after, at.x, None)
+        memory = self.problem.memory()
+        return Event("limit point", at.load, at.arc, before, after, at.x, memory=memory)
 
     def _bifurcations(self, old: ArcPoint, new: ArcPoint, limits: list[Event]) -> list[Event]:
         """Where eigenvalues pass zero that are not those of a turning load."""
@@ -452,7 +455,7 @@ class ArcPath:
             before, after = (level, level + 1) if up else (level + 1, level)
             mode.vector.scale(1.0 / self.metric.norm(mode.vector))
             args = (point.load, point.arc, before, after, point.x, mode.vector)
-            found.append(Event("bifurcation", *args))
+            found.append(Event("bifurcation", *args, memory=self.problem.memory()))
         return found
 
     def _crossing(self, old: ArcPoint, new: ArcPoint, level: int) -> tuple[ArcPoint, Mode]:
