@@ -70,6 +70,14 @@ def test_the_first_of_several_stops_is_met():
     assert path.end.load < 0.8
 
 
+def test_a_path_may_start_on_a_stop_and_meets_it_again():
+    first = uo.follow_path(truss(), [0.5], arc=QUICK)
+    again = uo.follow_path(first.model, [0.5], towards=first.end.tangent, arc=QUICK)
+    assert again.reason == "load factor = 0.5"
+    assert again.end.load == pytest.approx(0.5, abs=1e-9)
+    assert again.model.position("A")[2] > first.history["position_A_z"][-1] + 0.05
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_stop_at_a_gap(model):
     path = uo.follow_path(under_a_ceiling(model), [uo.at_gap("ceiling", 0.03)], arc=QUICK)
