@@ -399,7 +399,7 @@ class ArcPath:
             raise SolveError(f"between two states of the path: {refused}", old.load) from None
 
     def _stopped(self, old: ArcPoint, new: ArcPoint, stop: Stop, below, above) -> ArcPoint | None:
-        """The point on the way at which a stop's measure is zero; None where a path starts on it."""
+        """The point at which a stop's measure is zero; None where the path starts there."""
         length, found = new.arc - old.arc, {0.0: below, new.arc - old.arc: above}
 
         def value(size: float) -> float:
