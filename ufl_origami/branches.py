@@ -98,13 +98,15 @@ def switch_branch(
         The way from the bifurcation, a direction for `follow_path`.
 
     Raises:
-        InputError: no eigenvector, or a side that is neither 1 nor -1.
+        InputError: no eigenvector, a side that is neither 1 nor -1, a size that is not positive.
         SolveError: no state was found there.
     """
     if event.mode is None:
         raise InputError(f"the {event.kind} at {event.load:g} has no eigenvector to leave along")
     if side not in (1, -1):
         raise InputError(f"side {side} is neither 1 nor -1")
+    if size is not None and not 0 < size < np.inf:
+        raise InputError(f"size {size} of the way to the branch is not positive")
     restore(model, event)
     metric = Metric(model.problem)
     thickness = max(model.scene.panel_material(name).h for name in model.sheet.panel_names)

@@ -46,7 +46,7 @@ def at_position(point: str, axis: str, value: float) -> PathStop:
     Raises:
         InputError: unknown axis; on use, an unknown point.
     """
-    if axis not in AXES:
+    if axis not in tuple(AXES):
         raise InputError(f"stop at {point!r}: axis {axis!r} is none of 'x', 'y', 'z'")
     index = AXES.index(axis)
     return PathStop(lambda model: float(model.position(point)[index]), value, f"{point}, {axis}")

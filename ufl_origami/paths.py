@@ -13,6 +13,8 @@ from typing import Any, ClassVar
 
 from petsc4py import PETSc
 
+import numpy as np
+
 from ufl_origami.checkpoint import Memory
 from ufl_origami.discretise import build
 from ufl_origami.errors import InputError
@@ -112,6 +114,9 @@ def follow_path(
     wanted = make_stops(stops)
     if not wanted and turns is None:
         raise InputError("a path needs a stop, or a number of turns")
+    if turns is not None and turns < 1:
+        raise InputError(f"turns = {turns}: a path ends after one limit point or more")
+    _require_way(towards)
     model = scene if isinstance(scene, Model) else build(scene)
     if not model.scene.terms:
         check_supports(model)
@@ -141,6 +146,12 @@ def follow_path(
     warn_round_off(model)
     assert path.point is not None
     return PathResult(model, path.steps, log.history, path.events, path.point, path.reason)
+
+
+def _require_way(towards: PETSc.Vec | float) -> None:
+    size = towards.norm() if isinstance(towards, PETSc.Vec) else towards
+    if size == 0 or not np.isfinite(size):
+        raise InputError(f"towards: {size:g} is no direction to set out in")
 
 
 def _text(stop: PathStop) -> str:

@@ -33,6 +33,9 @@ log = logging.getLogger(__name__)
 EVALUATIONS = 60
 """Points that the search for one event may take."""
 
+ON_A_STOP = 1e-6
+"""Part of the first step within which a path starts on a stop: as well as states are solved."""
+
 
 @dataclass(frozen=True)
 class ArcSettings:
@@ -328,7 +331,9 @@ class ArcPath:
         for stop, value in zip(stops, before, strict=True):
             after = stop.measure(new.x, new.load)
             if value * after < 0 or (after == 0 and value != 0):
-                return self._stopped(old, new, stop, value, after), cuts, stop
+                met = self._stopped(old, new, stop, value, after)
+                if met is not None:
+                    return met, cuts, stop
         return new, cuts, None
 
     def _try(self, old: ArcPoint, size: float) -> tuple[ArcPoint, int]:
@@ -393,8 +398,8 @@ class ArcPath:
         except _Refused as refused:
             raise SolveError(f"between two states of the path: {refused}", old.load) from None
 
-    def _stopped(self, old: ArcPoint, new: ArcPoint, stop: Stop, below, above) -> ArcPoint:
-        """The point on the way at which a stop's measure is zero."""
+    def _stopped(self, old: ArcPoint, new: ArcPoint, stop: Stop, below, above) -> ArcPoint | None:
+        """The point at which a stop's measure is zero; None where the path starts there."""
         length, found = new.arc - old.arc, {0.0: below, new.arc - old.arc: above}
 
         def value(size: float) -> float:
@@ -404,7 +409,9 @@ class ArcPath:
             return found[size]
 
         size = brentq(value, 0.0, length, xtol=1e-12 * length, rtol=1e-14, maxiter=EVALUATIONS)
-        return self._between(old, size) if 0 < size < length else new
+        if old.arc == 0.0 and size <= ON_A_STOP * length:
+            return None
+        return self._between(old, size) if size < length else new
 
     def _look_for_events(self, old: ArcPoint, new: ArcPoint) -> None:
         """Locate the limit points and bifurcations of one step.
