@@ -2,19 +2,22 @@
 
 Each method (discretisation) meets each difficulty with each solver, one difficulty at a time from
 a base case, and two declared pairs of difficulties; then difficulties in time with each way to
-step. A case ends right, wrong (a solution further than the bound from the exact answer) or failed
-(none was found). A wrong answer of which no warning told is the worst kind: failure_map.md lists
-all of them.
+step, and paths with limit points with each way to lead. A case ends right, wrong (a solution
+further than the bound from the exact answer) or failed (none was found). A wrong answer of which
+no warning told is the worst kind: failure_map.md lists all of them.
 
     ./run demo failure_map
     ./run demo failure_map --quick
     ./run demo failure_map --problem impact block skid corner
+    ./run demo failure_map --problem truss roof "thin roof"
     ./run demo failure_map -n 2
 
 newton is plain Newton and bt a line search, both with equal load steps and no cuts; default is the
 package's own solver in the same steps; auto is the package's own solver with automatic steps, as
 solve_static has them, of which only the first one is declared. In time, euler and bdf2 take equal
-steps; auto is BDF2 with the automatic steps of solve_dynamic, of which dt is the first one.
+steps; auto is BDF2 with the automatic steps of solve_dynamic, of which dt is the first one. Past
+limit points, newton and bt raise the load in equal steps, load and place are the package's own
+solver led by the load or by the place where it acts, arc is follow_path.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,6 +26,7 @@ from dataclasses import replace
 from mpi4py import MPI
 
 import _impact_grid as in_time
+import _snap_runs as on_path
 from _failure_cases import PROBLEMS, Method, Setting, Sheets
 from _failure_figures import draw_all
 from _failure_meshes import mesh_kinds
@@ -30,6 +34,7 @@ from _failure_runs import Outcome, Solver, run_case
 from _failure_text import Rows, Study, describe, flat_rows, write_csv, write_text
 from _impact_cases import PROBLEMS as THROWS
 from _impact_runs import run_throw
+from _snap_cases import PROBLEMS as SNAPS
 
 from ufl_origami.demo import fail_together, read_options, write_summary
 from ufl_origami.sheet import known_name
@@ -114,7 +119,7 @@ def in_short(setting, method, solver):
 # %% Solution
 comm = MPI.COMM_WORLD
 fail_together(comm)
-names = (*PROBLEMS, *THROWS)
+names = (*PROBLEMS, *THROWS, *SNAPS)
 options = read_options("failure_map", __doc__, {"problem": names}, quick={}, comm=comm)
 for name in options.problem:
     known_name(name, names, "problem")
@@ -133,6 +138,7 @@ def first(rows) -> str:
 
 groups, pairs = map(chosen, declare(QUICK if options.quick else WHOLE))
 throws = chosen(in_time.declare(in_time.QUICK if options.quick else in_time.WHOLE))
+snaps = chosen(on_path.declare(on_path.QUICK if options.quick else on_path.WHOLE))
 sheets = Sheets(comm, coarser=2 if options.quick else 1)
 
 
@@ -192,8 +198,28 @@ dynamics = Study(
     columns=2,
 )
 
+paths = Study(
+    name="failure_map_path",
+    title="Which way gets past which limit point",
+    explained=on_path.EXPLAINED,
+    methods=[method.name for method in on_path.METHODS],
+    solvers=[lead.name for lead in on_path.LEADS],
+    own=on_path.OWN,
+    groups=snaps,
+    pairs={},
+    outcomes=solve(
+        snaps,
+        on_path.METHODS,
+        on_path.LEADS,
+        lambda *case: on_path.run_snap(*case, comm),
+        on_path.in_short,
+    ),
+    number=lambda outcome: f"{outcome.measured['limit_points']}/{outcome.measured['of']}",
+    numbers="limit points found, of those there are",
+)
+
 # %% Results
-studies = [study for study in (statics, dynamics) if study.outcomes]
+studies = [study for study in (statics, dynamics, paths) if study.outcomes]
 if comm.rank == 0:
     rows = flat_rows(studies)
     write_summary(options.output, rows)
@@ -218,6 +244,14 @@ if dynamics.outcomes and comm.rank == 0:
     text = f"in time, auto: {len(thrown) - len(failed) - len(lost)} of {len(thrown)} single"
     text += f" difficulties end right, {len(failed)} fail and name the barrier"
     print(f"{text}; {through} of all sheets go through the floor")
+arcs = [one for method in on_path.METHODS for one in paths.picked(method.name, "arc")]
+short = [describe(one.setting) for one in arcs if not on_path.passed(one)]
+hidden = [describe(one.setting) for one in paths.outcomes.values() if on_path.hidden(one)]
+if paths.outcomes and comm.rank == 0:
+    text = f"by arc length: {len(arcs) - len(short)} of {len(arcs)} paths end right with all their"
+    print(f"{text} limit points; {len(hidden)} ways jumped past one without a word")
 assert not missed, f"the claim fails: {missed}"
 assert not lost, f"the claim in time fails: {lost}"
 assert not through, f"{through} sheets went through the floor"
+assert not short, f"the claim about arc length fails: {short}"
+assert not hidden, f"jumps without a warning: {hidden}"

@@ -28,6 +28,7 @@ from _impact_runs import run_throw  # noqa: E402
 DIRECTOR, SHARP = "director", 1e-12
 BOUND, BOUND_IN_TIME = 0.03, 0.05
 IN_TIME = ("impact", "block", "skid", "corner")
+SNAPS = ("truss", "roof", "thin roof")
 
 
 def demo(folder, *words, ranks=1):
@@ -37,10 +38,11 @@ def demo(folder, *words, ranks=1):
 
 
 def read_runs(folder):
-    """Runs of the static part, and those in time."""
+    """Runs of the static part, those in time, and those past limit points."""
     runs = json.loads((folder / "summary.json").read_text())["runs"]
-    static = [run for run in runs if run["problem"] not in IN_TIME]
-    return static, [run for run in runs if run["problem"] in IN_TIME]
+    static = [run for run in runs if run["problem"] not in (*IN_TIME, *SNAPS)]
+    parts = [[run for run in runs if run["problem"] in part] for part in (IN_TIME, SNAPS)]
+    return static, *parts
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +50,10 @@ def quick(tmp_path_factory):
     """Folder, static runs, runs in time and console of the quick grid."""
     folder = tmp_path_factory.mktemp("failure_map")
     done = demo(folder, "--quick")
-    static, thrown = read_runs(folder)
-    return SimpleNamespace(folder=folder, static=static, thrown=thrown, console=done.stdout)
+    static, thrown, led = read_runs(folder)
+    return SimpleNamespace(
+        folder=folder, static=static, thrown=thrown, led=led, console=done.stdout
+    )
 
 
 def picked(runs, **values):
@@ -66,6 +70,16 @@ def test_own_solver_with_directors_is_right_in_every_difficulty(quick):
     other = [run for run in runs if run["verdict"] != "right"]
     assert all(run["h"] == 1e-4 and run["warned"] for run in other)
     assert re.search(r"director, auto: (\d+) of \1 single difficulties .* end right", quick.console)
+
+
+@pytest.mark.serial
+def test_arc_length_finds_the_limit_points_that_a_load_jumps_over(quick):
+    for method in ("director", "fem"):
+        (arc,) = picked(quick.led, method=method, solver="arc")
+        (load,) = picked(quick.led, method=method, solver="load")
+        assert (arc["verdict"], arc["limit_points"], arc["warned"]) == ("right", 2, "")
+        assert (load["verdict"], load["limit_points"], load["warned"]) == ("right", 0, "branch")
+        assert arc["error"] < 1e-6 and load["error"] < 1e-6
 
 
 @pytest.mark.serial
@@ -169,7 +183,7 @@ def test_energy_in_time_is_accounted_for_and_never_gained(quick):
 
 @pytest.mark.serial
 def test_verdicts_follow_from_errors_and_reasons(quick):
-    for runs, bound in ((quick.static, BOUND), (quick.thrown, BOUND_IN_TIME)):
+    for runs, bound in ((quick.static, BOUND), (quick.thrown, BOUND_IN_TIME), (quick.led, BOUND)):
         for run in runs:
             failed = run["verdict"] == "failed"
             assert failed == bool(run["reason"]) == (run["error"] is None)
@@ -181,14 +195,15 @@ def test_verdicts_follow_from_errors_and_reasons(quick):
 def test_text_lists_and_counts_what_the_table_holds(quick):
     text = (quick.folder / "failure_map.md").read_text()
     assert text.strip() in quick.console
-    runs = [*quick.static, *quick.thrown]
+    runs = [*quick.static, *quick.thrown, *quick.led]
     with (quick.folder / "failure_map.csv").open(newline="") as stream:
         rows = [*csv.DictReader(stream)]
     assert [row["verdict"] for row in rows] == [run["verdict"] for run in runs]
     assert all([*row] == [*runs[0]] for row in rows)
-    title, part, time = re.split(r"^# ", text, flags=re.MULTILINE)
+    title, part, time, path = re.split(r"^# ", text, flags=re.MULTILINE)
     assert title == "" and time.startswith("Where methods fail in time\n")
-    for section, found in ((part, quick.static), (time, quick.thrown)):
+    assert path.startswith("Which way gets past which limit point\n")
+    for section, found in ((part, quick.static), (time, quick.thrown), (path, quick.led)):
         check_section(section, found)
 
 
@@ -226,7 +241,7 @@ def test_maps_are_drawn(quick):
 def test_two_ranks_find_the_same(quick, tmp_path):
     """The same grid; the same errors but where round-off decides (thin, or led by an edge)."""
     demo(tmp_path, "--quick", ranks=2)
-    static, thrown = read_runs(tmp_path)
+    static, thrown, _ = read_runs(tmp_path)
     keys = ("problem", "mesh", "h", "eta", "steps", "angle", "method", "solver", "triangles")
     assert [[run[k] for k in keys] for run in static] == [
         [run[k] for k in keys] for run in quick.static
