@@ -15,6 +15,7 @@ import ufl_origami as uo
 from ufl_origami import demo
 from ufl_origami.scene import Scene
 from ufl_origami.scene_surroundings import Surroundings
+from ufl_origami.solvers.continuation import ArcSettings
 from ufl_origami.solvers.dynamics import TimeSettings
 from ufl_origami.solvers.newton import NewtonSettings
 from ufl_origami.solvers.static import StepSettings
@@ -85,6 +86,18 @@ def test_first_motion_runs_and_its_energy_book_is_balanced(tmp_path, monkeypatch
     assert np.abs(history["imbalance"]).max() < 1e-8 * scale
     assert 0 < contact.smallest < contact.at.surface.barrier.distance
     assert "smallest gap:" in capsys.readouterr().out
+
+
+def test_first_path_passes_both_limit_points():
+    (code,) = blocks(ROOT / "docs" / "paths.md")
+    names = {}
+    exec(compile(code, "paths.md", "exec"), names)
+    path = names["path"]
+    limit = 1e4 * 0.3 * 0.2**3 / (1 + 0.2**2) ** 1.5 * 2 / 3**1.5  # truss in Green's strain
+    loads = [9.0 * event.load for event in path.events]
+    assert loads == pytest.approx([limit, -limit], rel=1e-4)
+    assert [(event.before, event.after) for event in path.events] == [(0, 1), (1, 0)]
+    assert path.reason == "load factor = 1.5"
 
 
 def test_example_of_an_own_term_runs_as_it_stands(tmp_path):
@@ -160,6 +173,7 @@ def test_methods_of_the_scene_in_the_readme_exist():
 SETTINGS = {
     "solver.md": (NewtonSettings(), StepSettings()),
     "time.md": (TimeSettings(step=1.0),),
+    "paths.md": (ArcSettings(),),
 }
 
 

@@ -1,7 +1,7 @@
 """One call that follows a scene in time and keeps what it finds (see recording.py)."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import ClassVar
@@ -16,10 +16,9 @@ from ufl_origami.discretise import build
 from ufl_origami.energy_book import EnergyBook
 from ufl_origami.errors import InputError, SceneError
 from ufl_origami.history import History, Record, Row, time_row
-from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.problem import Problem
-from ufl_origami.recording import Disk, Log, ProgressBar
+from ufl_origami.recording import Log, Recording, recorded
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
 from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep, sheet_size
@@ -107,8 +106,8 @@ def solve_dynamic(
         AccuracyWarning: the smallest step was too long for the tolerance.
         ContactWarning: a gap has nearly closed.
     """
-    if resume and output is None:
-        raise InputError("resume: name the output folder of the run to resume")
+    how = Recording(output, resume, progress, on_accept)
+    how.require_folder()
     model = scene if isinstance(scene, Model) else build(scene)
     record = record or Record()
     settings = newton or NewtonSettings(iterations=ITERATIONS, reuse=REUSE)
@@ -119,31 +118,12 @@ def solve_dynamic(
         if not resume:
             require_stops(stops, model.problem.time)
         log = Log(model, record, run)
-    with ExitStack() as stack:
-        stack.callback(run.path.newton.close)
-        disk = None
-        if output is not None:
-            disk = stack.enter_context(Disk(log, Path(output)))
-        if resume and disk:
-            disk.resume()
-        else:
-            log.observe()
-            if disk:
-                disk.begin()
-        bar = stack.enter_context(closing(ProgressBar(model, stops, progress, "time")))
-        request = stack.enter_context(InterruptRequest())
+    with closing(run.path.newton), recorded(log, how, stops, "time") as record_step:
 
-        def accept(step: TimeStep, x: PETSc.Vec) -> None:
+        def accept(step: TimeStep, _: PETSc.Vec) -> None:
             run.accept(step)
             steps.append(step)
-            log.observe()
-            if disk:
-                disk.observe()
-            bar.observe(step)
-            if on_accept:
-                on_accept(step, model)
-            if request.agreed(model.sheet.comm):
-                raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
+            record_step(step)
 
         run.path.run(model.x, stops, accept)
     return DynamicResult(model, steps, log.history)

@@ -19,11 +19,10 @@ from ufl_origami.checkpoint import Memory
 from ufl_origami.discretise import build
 from ufl_origami.errors import InputError
 from ufl_origami.history import History, Record, Row, energy_columns, step_row
-from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.path_stops import PathStop, make_stops
 from ufl_origami.quality import warn_sagitta
-from ufl_origami.recording import Disk, Log, ProgressBar
+from ufl_origami.recording import Log, Recording, recorded
 from ufl_origami.resolution import warn_round_off
 from ufl_origami.run import end_motion
 from ufl_origami.scene import Scene
@@ -110,8 +109,8 @@ def follow_path(
         BranchWarning: a limit point or bifurcation was passed and could not be located.
         MeshWarning, RoundOffWarning: as `solve_static` does.
     """
-    if resume and output is None:
-        raise InputError("resume: name the output folder of the run to resume")
+    how = Recording(output, resume, progress, on_accept)
+    how.require_folder()
     wanted = make_stops(stops)
     if not wanted and turns is None:
         raise InputError("a path needs a stop, or a number of turns")
@@ -135,30 +134,11 @@ def follow_path(
             measure.measure(model.x, model.problem.time)
         path.start(model.x.copy(), model.problem.time, towards)
         start.pop_all()
-    with ExitStack() as stack:
-        stack.callback(solver.close)
-        disk = None
-        if output is not None:
-            disk = stack.enter_context(Disk(log, Path(output)))
-        if resume and disk:
-            disk.resume()
-        else:
-            log.observe()
-            if disk:
-                disk.begin()
-        bar = stack.enter_context(closing(ProgressBar(model, [], progress, "load factor")))
-        request = stack.enter_context(InterruptRequest())
+    with closing(solver), recorded(log, how, [], "load factor") as record_step:
 
         def accept(step: Step, point: ArcPoint) -> None:
             point.x.copy(model.x)
-            log.observe()
-            if disk:
-                disk.observe()
-            bar.observe(step)
-            if on_accept:
-                on_accept(step, model)
-            if request.agreed(model.sheet.comm):
-                raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
+            record_step(step)
 
         if path.reason not in [*map(_text, wanted), path.turned(turns)] or not path.reason:
             path.run(measures, accept, turns)

@@ -10,10 +10,11 @@ In the output folder:
 
 import sys
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from math import floor
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from petsc4py import PETSc
 
@@ -23,6 +24,7 @@ from ufl_origami.checkpoint import Checkpoint, Memory
 from ufl_origami.collective import on_rank0
 from ufl_origami.errors import InputError, SolveError
 from ufl_origami.history import CsvFile, History, Record, Recorder, Row, read_history
+from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model
 from ufl_origami.output import FieldWriter
 from ufl_origami.solvers.dynamics import TimeStep
@@ -216,3 +218,70 @@ class ProgressBar:
         """Leave the last line standing."""
         if self._bar is not None:
             self._bar.close()
+
+
+class Recording(NamedTuple):
+    """How a run is to be recorded and shown.
+
+    Attributes:
+        output: folder of history, fields and checkpoint; None: history in memory only.
+        resume: whether the run in the folder goes on.
+        progress: whether to show a progress bar; None: where the error stream is a terminal.
+        on_accept: called with each accepted step and the model, after all is written.
+    """
+
+    output: str | Path | None
+    resume: bool
+    progress: bool | None
+    on_accept: Callable[[Any, Model], None] | None
+
+    def require_folder(self) -> None:
+        """Refuse to resume a run that is nowhere.
+
+        Raises:
+            InputError: no folder is named.
+        """
+        if self.resume and self.output is None:
+            raise InputError("resume: name the output folder of the run to resume")
+
+
+@contextmanager
+def recorded(
+    log: Log, how: Recording, stops: Sequence[float], label: str
+) -> Iterator[Callable[[Step | TimeStep], None]]:
+    """Record a run: gives the function that takes each accepted step, the model in its state.
+
+    Args:
+        log: history; a run that has a row for its start gets it here.
+        how: folder, progress, callback.
+        stops: where the run will stop, for the progress bar.
+        label: what time is called.
+
+    Raises:
+        KeyboardInterrupt: by the function given, after Ctrl-C, on all ranks.
+        InputError: there is no such run to resume.
+        OSError: a file could not be written.
+    """
+    with ExitStack() as stack:
+        disk = stack.enter_context(Disk(log, Path(how.output))) if how.output is not None else None
+        if disk and how.resume:
+            disk.resume()
+        else:
+            if log.run.rows:
+                log.observe()
+            if disk:
+                disk.begin()
+        bar = stack.enter_context(closing(ProgressBar(log.model, stops, how.progress, label)))
+        request = stack.enter_context(InterruptRequest())
+
+        def accept(step: Step | TimeStep) -> None:
+            log.observe()
+            if disk:
+                disk.observe()
+            bar.observe(step)
+            if how.on_accept:
+                how.on_accept(step, log.model)
+            if request.agreed(log.model.sheet.comm):
+                raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
+
+        yield accept

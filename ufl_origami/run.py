@@ -1,7 +1,7 @@
 """One call that follows a scene's static path and keeps what it finds (see recording.py)."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -10,12 +10,10 @@ from petsc4py import PETSc
 
 from ufl_origami.checkpoint import Memory
 from ufl_origami.discretise import build
-from ufl_origami.errors import InputError
 from ufl_origami.history import History, Record, Row, energy_columns, step_row
-from ufl_origami.interrupt import InterruptRequest
 from ufl_origami.model import Model, unchanged_where_refused
 from ufl_origami.quality import warn_sagitta
-from ufl_origami.recording import Disk, Log, ProgressBar
+from ufl_origami.recording import Log, Recording, recorded
 from ufl_origami.resolution import warn_round_off
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
@@ -87,8 +85,8 @@ def solve_static(
         BranchWarning: an accepted state was found far from the predicted one.
         RoundOffWarning: the forces at the end are smaller than their round-off.
     """
-    if resume and output is None:
-        raise InputError("resume: name the output folder of the run to resume")
+    how = Recording(output, resume, progress, on_accept)
+    how.require_folder()
     model = scene if isinstance(scene, Model) else build(scene)
     if not model.scene.terms:  # a term of the user's own may hold the sheet as well
         check_supports(model)
@@ -101,26 +99,8 @@ def solve_static(
         solver = NewtonSolver(model.problem, newton or NewtonSettings())
         path = StaticPath(model.problem, solver, steps or StepSettings(), Admissible(model))
         log = Log(model, record, _StaticRun(path, model, record))
-    with ExitStack() as stack:
-        stack.callback(solver.close)
-        disk = None
-        if output is not None:
-            disk = stack.enter_context(Disk(log, Path(output)))
-            disk.resume() if resume else disk.begin()
-        bar = stack.enter_context(closing(ProgressBar(model, stops, progress, "load factor")))
-        request = stack.enter_context(InterruptRequest())
-
-        def accept(step: Step, x: PETSc.Vec) -> None:
-            log.observe()
-            if disk:
-                disk.observe()
-            bar.observe(step)
-            if on_accept:
-                on_accept(step, model)
-            if request.agreed(model.sheet.comm):
-                raise KeyboardInterrupt(f"stopped after the step to {step.time:g} was accepted")
-
-        path.run(model.x, model.problem.time, stops, accept)
+    with closing(solver), recorded(log, how, stops, "load factor") as accept:
+        path.run(model.x, model.problem.time, stops, lambda step, _: accept(step))
     warn_sagitta(model)
     warn_round_off(model)
     return StaticResult(model, path.steps, log.history)

@@ -65,7 +65,7 @@ class ArcSettings:
     shortest: float = 1e-5
     growth: float = 1.5
     easy: int = 5
-    bend: float = np.pi / 6
+    bend: float = 0.5
     stray: float = 0.5
     tolerance: float = 1e-6
     steps: int = 1000

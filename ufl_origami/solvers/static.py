@@ -30,6 +30,16 @@ NEGLIGIBLE = 1e-3
 """Distance over the sheet's size below which no branch is lost."""
 
 
+DOUBTFUL = 0.1
+"""Distance from the predicted state over the step, from which on the way back is looked at."""
+
+JUMPED = 5.0
+"""Length of a step over what the tangent at its end says, from which on it may be a jump."""
+
+SAME = 1e-3
+"""Distance over a step's length at which the way back has come back."""
+
+
 @dataclass(frozen=True)
 class StepSettings:
     """Sizes of the load steps, in units of the load factor or time.
@@ -212,7 +222,7 @@ class StaticPath:
         self._effort = report.iterations
         self.newton.report = NewtonReport()
         self.newton.allowed = 0
-        negative = self._factor_at(trial, target)
+        negative, back = self._adopt(x, trial, time, target, doubtful=report.strayed > DOUBTFUL)
         step = Step(
             number=len(self.steps) + 1,
             time=target,
@@ -223,13 +233,51 @@ class StaticPath:
             seconds=clock.perf_counter() - begin,
             cuts=cuts,
         )  # fmt: skip
-        trial.copy(x)
-        self.problem.accept(x)
         self.steps.append(step)
         self._unstable = negative or 0
-        self._warnings = remarks(step, far=far)
+        self._warnings = remarks(step, far=far or not back)
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
         return step
+
+    def _adopt(
+        self, x: PETSc.Vec, trial: PETSc.Vec, time: float, target: float, *, doubtful: bool
+    ) -> tuple[int | None, bool]:
+        """Make a trial the accepted state; its inertia, and whether the path leads back from it.
+
+        Whatever is raised on the way leaves the last state as it was.
+        """
+        before, memory = x.copy(), self.problem.memory()
+        try:
+            trial.copy(x)
+            self.problem.accept(x)
+            negative = self._factor_at(x, target)
+            return negative, not doubtful or self._leads_back(x, before, time)
+        except BaseException:
+            before.copy(x)
+            self.problem.recall(memory)
+            raise
+
+    def _leads_back(self, new: PETSc.Vec, x: PETSc.Vec, time: float) -> bool:
+        """Whether the path from a new state leads back to the last one, or has jumped.
+
+        Near a limit point any state beyond is near the predicted one. Where the step is much longer
+        than the new state's own tangent says, the way back is solved for.
+        """
+        target = self.problem.time
+        step = self._predict(new, time)
+        guess = new.copy()
+        guess.axpy(1.0, step)
+        length = self._length(x, new)
+        if length > JUMPED * self._length(new, guess):
+            report = self.newton.report
+            self.newton.report = NewtonReport()
+            found = self.newton.solve(guess, new, search=False)
+            same = found.converged and self._length(guess, x) < SAME * length
+            self.newton.report = report
+        else:
+            same = True
+        self._factor_at(new, target)
+        return same
 
     def _refusal(self, trial: PETSc.Vec, report: NewtonReport, time: float) -> str:
         """Why a trial cannot be accepted, or an empty string.
