@@ -6,7 +6,7 @@ import os
 import platform
 import resource
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,16 +118,21 @@ def parser(description: str) -> argparse.ArgumentParser:
 class Table:
     """Rows of figures, printed as they come by rank 0 and kept for the file."""
 
-    def __init__(self, comm: MPI.Comm, title: str, columns: Sequence[tuple[str, str]]):
-        """Print the head; columns are (name, format) pairs."""
-        self.comm, self.title, self.columns = comm, title, columns
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        title: str,
+        columns: Sequence[tuple[str, str]],
+        widths: Mapping[str, int] | None = None,
+    ):
+        """Print the head; columns are (name, format) pairs, widths those of names wider than 9."""
+        self.comm, self.title, self.columns, self.widths = comm, title, columns, widths or {}
         self.rows: list[dict[str, object]] = []
         self._print(f"{title}, {comm.size} rank(s)")
         self._print("  ".join(f"{name:>{self._width(name)}}" for name, _ in columns))
 
-    @staticmethod
-    def _width(name: str) -> int:
-        return max(len(name), 9)
+    def _width(self, name: str) -> int:
+        return max(len(name), self.widths.get(name, 9))
 
     def _print(self, text: str) -> None:
         if self.comm.rank == 0:

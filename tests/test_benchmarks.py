@@ -87,3 +87,16 @@ def test_fem_formulations_against_locking(tmp_path, mesh):
     for name, (w, u) in others.items():
         assert u > 1 and w > 5 * max(twin), name
     assert others["hhj_regge"] < others["hhj"]
+
+
+@pytest.mark.serial
+def test_critical_loads(tmp_path):
+    rows = rows_of("critical_loads.py", tmp_path, "--problem", "column", "crease", "blade")
+    assert {row["model"] for row in rows} == {"ddg", "fem"}
+    assert len({row["problem"] for row in rows}) == 9
+    for row in rows:
+        limit = 0.5 if row["model"] == "fem" else 6.0
+        assert abs(row["error %"]) < limit, row
+        exact = row["exact"] * (1 + row["error %"] / 100)
+        assert row["critical load"] == pytest.approx(exact)
+        assert row["evaluations"] > 2

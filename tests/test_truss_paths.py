@@ -180,3 +180,18 @@ def test_force_of_a_landscape_is_the_slope_of_its_energy(model):
     scale = np.abs(found.forces).max()
     assert found.forces[1:-1] == pytest.approx(slope, abs=2 * step**2 * 12 * scale)
     assert found.forces[[0, -1]] == pytest.approx(0.0, abs=1e-6 * scale)
+
+
+@pytest.mark.filterwarnings("ignore::ufl_origami.errors.MeshWarning")  # shrinks by half
+def test_limit_point_and_bifurcations_of_one_step_are_told_apart():
+    """Thick panels of the steep truss buckle twice just behind the limit point."""
+    scene = scenes.truss(HEIGHT, **STEEP)
+    before = uo.follow_path(scene, [0.99], arc=uo.ArcSettings(first=0.1, locate=False))
+    way = before.end.tangent
+    path = uo.follow_path(before.model, [0.92], towards=way, arc=uo.ArcSettings(first=1.0))
+    assert [event.kind for event in path.events] == ["limit point", "bifurcation", "bifurcation"]
+    count = before.history["negative_pivots"][-1]
+    for event in path.events:
+        assert (event.before, event.after) == (count, count + 1)
+        count = event.after
+    assert path.history["negative_pivots"][-1] == count

@@ -33,6 +33,9 @@ log = logging.getLogger(__name__)
 EVALUATIONS = 60
 """Points that the search for one event may take."""
 
+BESIDE = 1e-3
+"""Part of a step next to a limit point within which a change of inertia counts as its own."""
+
 ON_A_STOP = 1e-6
 """Part of the first step within which a path starts on a stop: as well as states are solved."""
 
@@ -416,87 +419,78 @@ class ArcPath:
     def _look_for_events(self, old: ArcPoint, new: ArcPoint) -> None:
         """Locate the limit points and bifurcations of one step.
 
-        The inertia counts eigenvalues that change sign. One of them belongs to a turn of the load.
+        The inertia counts eigenvalues that change sign. What changes at the turn of the load is
+        told apart from what changes before and after it.
         """
-        turned, change = old.slope * new.slope < 0, (new.pivots or 0) - (old.pivots or 0)
         found: list[Event] = []
+        ends = [old, new]
         try:
-            if turned:
-                found.append(self._limit_point(old, new))
-            if None not in (old.pivots, new.pivots) and abs(change) != turned:
-                found += self._bifurcations(old, new, found)
+            if old.slope * new.slope < 0:
+                limit, low, high = self._limit_point(old, new)
+                found.append(limit)
+                ends = [old, low, high, new]
+            for first, last in zip(ends[::2], ends[1::2], strict=True):
+                found += self._bifurcations(old, first, last)
         except SolveError as error:
             text = f"an event between load factors {old.load:g} and {new.load:g} was not located"
             warnings.warn(f"{text}: {error.reason}", BranchWarning, stacklevel=2)
         self.events += sorted(found, key=lambda event: event.arc)
         self.problem.set_time(new.load)
 
-    def _limit_point(self, old: ArcPoint, new: ArcPoint) -> Event:
-        """Where the load factor turns."""
+    def _limit_point(self, old: ArcPoint, new: ArcPoint) -> tuple[Event, ArcPoint, ArcPoint]:
+        """Where the load factor turns, and points close before and behind it."""
         length = new.arc - old.arc
         points = {0.0: old, length: new}
 
-        def slope(size: float) -> float:
+        def point(size: float) -> ArcPoint:
             if size not in points:
                 points[size] = self._between(old, size)
-            return points[size].slope
+            return points[size]
 
         tolerance = self.settings.tolerance * length
-        size = brentq(slope, 0.0, length, xtol=tolerance, maxiter=EVALUATIONS)
-        slope(size)
-        at, low, high = points[size], _count(old, new, min), _count(old, new, max)
-        rises = _count(old, new, lambda a, b: a) == low
-        before, after = (low, high) if rises else (high, low)
+        size = brentq(
+            lambda size: point(size).slope, 0.0, length, xtol=tolerance, maxiter=EVALUATIONS
+        )
+        at, beside = point(size), max(BESIDE * length, 10 * tolerance)
+        low, high = point(max(size - beside, 0.0)), point(min(size + beside, length))
         memory = self.problem.memory()
-        return Event("limit point", at.load, at.arc, before, after, at.x, memory=memory)
+        args = (at.load, at.arc, low.pivots, high.pivots, at.x)
+        return Event("limit point", *args, memory=memory), low, high
 
-    def _bifurcations(self, old: ArcPoint, new: ArcPoint, limits: list[Event]) -> list[Event]:
-        """Where eigenvalues pass zero that are not those of a turning load."""
+    def _bifurcations(self, old: ArcPoint, first: ArcPoint, last: ArcPoint) -> list[Event]:
+        """Where eigenvalues pass zero between two points of the step that starts at `old`."""
         found: list[Event] = []
-        for level in _levels(old.pivots, new.pivots):
-            point, mode = self._crossing(old, new, level)
-            close = 1e-3 * (new.arc - old.arc)
-            if any(abs(limit.arc - point.arc) < close for limit in limits):
-                continue
-            up = (new.pivots or 0) > (old.pivots or 0)
-            before, after = (level, level + 1) if up else (level + 1, level)
+        before, after = first.pivots, last.pivots
+        if before is None or after is None:
+            return found
+        for level in range(min(before, after), max(before, after)):
+            point, mode = self._crossing(old, first, last, level)
+            counts = (level, level + 1) if after > before else (level + 1, level)
             mode.vector.scale(1.0 / self.metric.norm(mode.vector))
-            args = (point.load, point.arc, before, after, point.x, mode.vector)
+            args = (point.load, point.arc, *counts, point.x, mode.vector)
             found.append(Event("bifurcation", *args, memory=self.problem.memory()))
         return found
 
-    def _crossing(self, old: ArcPoint, new: ArcPoint, level: int) -> tuple[ArcPoint, Mode]:
+    def _crossing(
+        self, old: ArcPoint, first: ArcPoint, last: ArcPoint, level: int
+    ) -> tuple[ArcPoint, Mode]:
         """Where the eigenvalue above `level` others passes zero, by secants within bisection."""
-        length = new.arc - old.arc
-        low, high = (0.0, old), (length, new)
+        low, high = first.arc - old.arc, last.arc - old.arc
         values: list[float | None] = [None, None]
-        tolerance = self.settings.tolerance * length
+        tolerance = self.settings.tolerance * (high - low)
         for _ in range(EVALUATIONS):
-            middle = 0.5 * (low[0] + high[0])
+            middle = 0.5 * (low + high)
             one, other = values
             if one is not None and other is not None and one * other < 0:
-                secant = low[0] + (high[0] - low[0]) * one / (one - other)
-                margin = 0.05 * (high[0] - low[0])
-                inside = low[0] + margin < secant < high[0] - margin
-                middle = secant if inside else middle
+                secant = low + (high - low) * one / (one - other)
+                margin = 0.05 * (high - low)
+                middle = secant if low + margin < secant < high - margin else middle
             point = self._between(old, middle)
             mode = crossing_mode(self.problem, point.x, point.load, level, point.pivots or 0)
-            if ((point.pivots or 0) > level) == ((old.pivots or 0) > level):
-                low, values[0] = (middle, point), mode.value
+            if ((point.pivots or 0) > level) == ((first.pivots or 0) > level):
+                low, values[0] = middle, mode.value
             else:
-                high, values[1] = (middle, point), mode.value
-            if high[0] - low[0] < tolerance or abs(mode.value) < 1e-12:
+                high, values[1] = middle, mode.value
+            if high - low < tolerance or abs(mode.value) < 1e-12:
                 break
         return point, mode
-
-
-def _count(old: ArcPoint, new: ArcPoint, choose) -> int | None:
-    if old.pivots is None or new.pivots is None:
-        return None
-    return choose(old.pivots, new.pivots)
-
-
-def _levels(before: int | None, after: int | None) -> range:
-    """Numbers of negative eigenvalues below each one that changes sign."""
-    low, high = sorted((before or 0, after or 0))
-    return range(low, high)
