@@ -69,6 +69,8 @@ def restore(model: Model, event: Event) -> None:
     """
     if event.x is None:
         raise InputError(f"the state of the {event.kind} at {event.load:g} was not kept: resumed")
+    if event.memories is not None:
+        model.problem.recall(event.memories)
     event.x.copy(model.x)
     model.problem.set_time(event.load)
     model.problem.accept(model.x)

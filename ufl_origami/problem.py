@@ -13,6 +13,9 @@ from ufl_origami.configuration import Configuration, State
 from ufl_origami.constraints import Constraints
 from ufl_origami.terms.base import Rates, Term
 
+Memories = list[dict[str, np.ndarray]]
+"""What a rank's terms remember of a state beside its unknowns: values by name for each term."""
+
 
 class Problem:
     """Owns the terms, the constraints and the matrix; knows no physics.
@@ -193,3 +196,15 @@ class Problem:
         state = self.state(vector)
         for term in self.terms:
             term.accept(state)
+
+    def memories(self) -> Memories:
+        """Copies of what this rank's terms remember of the accepted state, by term."""
+        return [
+            {name: share.values.copy() for name, share in term.history().items()}
+            for term in self.terms
+        ]
+
+    def recall(self, memories: Memories) -> None:
+        """Give the terms back what they remembered."""
+        for term, values in zip(self.terms, memories, strict=True):
+            term.restore({name: value.copy() for name, value in values.items()})

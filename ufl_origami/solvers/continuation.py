@@ -12,7 +12,7 @@ import logging
 import time as clock
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from petsc4py import PETSc
@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ufl_origami.errors import BranchWarning, InputError, SolveError
-from ufl_origami.problem import Problem
+from ufl_origami.problem import Memories, Problem
 from ufl_origami.solvers.bordered import Bordered, LoadFactor
 from ufl_origami.solvers.dynamics import sheet_size
 from ufl_origami.solvers.newton import NewtonSolver, area_weights
@@ -143,6 +143,8 @@ class Event:
         after: negative pivots after it.
         x: unknowns; None where a resumed run has forgotten them.
         mode: the critical eigenvector, of length 1 by the path's metric; None where there is none.
+        memories: what the terms remember, without which the unknowns are no state (angles are
+            measured from the state accepted before).
     """
 
     kind: str
@@ -152,6 +154,7 @@ class Event:
     after: int | None
     x: PETSc.Vec | None
     mode: PETSc.Vec | None = None
+    memories: Memories | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -419,6 +422,8 @@ class ArcPath:
         except SolveError as error:
             text = f"an event between load factors {old.load:g} and {new.load:g} was not located"
             warnings.warn(f"{text}: {error.reason}", BranchWarning, stacklevel=2)
+        memories = self.problem.memories() if found else None
+        found = [replace(event, memories=memories) for event in found]
         self.events += sorted(found, key=lambda event: event.arc)
         self.problem.set_time(new.load)
 
