@@ -12,7 +12,7 @@ from ufl_origami.plotting.paths import PathCurve, path_chart, stable_parts
 ARC = np.linspace(0.0, 1.0, 11)
 LOAD = ARC * (1.5 - ARC)  # turns at arc 0.75
 UNSTABLE = (ARC > 0.75).astype(int)
-TURN = [("limit point", 0.5625)]
+TURN = [("limit point", 0.5625, 1.5)]
 
 
 def curve(label="fold", **options):
@@ -44,15 +44,16 @@ def test_unstable_states_are_dashed_and_named_in_the_legend(tmp_path):
     assert sorted(lines) == sorted(2 * [(9, False), (3, True)])
 
 
-def test_an_event_stands_on_its_curve(tmp_path):
-    """At the turn the curve is highest in load, at arc 0.75 but for the steps' length."""
+def test_an_event_stands_where_it_is(tmp_path):
+    """Beside the state of arc 0.7, a step of 0.1 before which the curve is at most as steep."""
     text = path_chart({"": {"y": [curve()]}}, tmp_path / "paths.svg", abscissa="x").read_text()
     points = np.concatenate([points for points, _ in drawn(text)])
     use = re.search(r'<g clip-path[^>]*>\s*<use [^>]*x="([\d.]+)" y="([\d.]+)"', text)
-    place = np.array(use.groups(), float)
-    distance = np.linalg.norm(points - place, axis=1)
-    assert distance.min() < 0.06 * np.ptp(points[:, 1])
-    assert abs(points[distance.argmin(), 0] - points[:, 0].max()) < 0.02 * np.ptp(points[:, 0])
+    assert use
+    place, height = np.array(use.groups(), float), np.ptp(points[:, 1])
+    expected = points[0, 1] - 0.75 * height  # the ordinate is twice the arc length
+    assert abs(place[1] - expected) < 1e-3 * height
+    assert place[0] >= points[:, 0].max()
 
 
 def test_points_are_full_where_stable_and_hollow_elsewhere(tmp_path):
@@ -71,7 +72,7 @@ def test_points_are_full_where_stable_and_hollow_elsewhere(tmp_path):
         (lambda: {}, "nothing to draw"),
         (lambda: {"a": {"y": [curve()]}, "b": {"z": [curve()]}}, "different ordinates"),
         (lambda: {"a": {"y": [PathCurve(LOAD, LOAD, [0], "one")]}}, "does not pair"),
-        (lambda: {"a": {"y": [curve(events=[("snap", 0.1)])]}}, "'snap' is none of"),
+        (lambda: {"a": {"y": [curve(events=[("snap", 0.1, 0.1)])]}}, "'snap' is none of"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(charts, message, tmp_path):

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -13,7 +14,12 @@ from ufl_origami.errors import InputError
 from ufl_origami.plotting.charts import COLOURS, Series, _figure, _legend_columns
 
 _EVENTS = {"limit point": "v", "bifurcation": "D"}
-_EVENT = {"color": "#222222", "markerfacecolor": "white", "markersize": 5.0, "linestyle": "none"}
+_EVENT: dict[str, Any] = {
+    "color": "#222222",
+    "markerfacecolor": "white",
+    "markersize": 5.0,
+    "linestyle": "none",
+}
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class PathCurve:
         label: text of the legend; curves of one label share it.
         colour: index into `COLOURS`; by default the label's position among all labels.
         kind: "line" (solid where stable, else dashed) or "points" (full where stable, else hollow).
-        events: (kind, x) of limit points and bifurcations, put on the curve at the first passage.
+        events: (kind, x, y) of limit points and bifurcations.
     """
 
     x: ArrayLike
@@ -36,7 +42,7 @@ class PathCurve:
     label: str
     colour: int | None = None
     kind: Literal["line", "points"] = "line"
-    events: Sequence[tuple[str, float]] = ()
+    events: Sequence[tuple[str, float, float]] = ()
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not pair up and events of an unknown kind."""
@@ -46,7 +52,7 @@ class PathCurve:
                 f"path {self.label!r}: unstable {np.shape(self.unstable)} does not pair with x "
                 f"{np.shape(self.x)}"
             )
-        for kind, _ in self.events:
+        for kind, *_ in self.events:
             if kind not in _EVENTS:
                 raise InputError(f"path {self.label!r}: {kind!r} is none of {[*_EVENTS]}")
 
@@ -107,7 +113,7 @@ def stable_parts(unstable: ArrayLike) -> Iterator[tuple[slice, bool]]:
     """
     stable = np.asarray(unstable) == 0
     bounds = [0, *(np.flatnonzero(np.diff(stable)) + 1), len(stable)]
-    for start, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, end in pairwise(bounds):
         yield slice(int(start), int(end) + 1), bool(stable[start])
 
 
@@ -124,18 +130,8 @@ def _draw_path(axes, curve: PathCurve, colour: str) -> None:
         for part, stable in stable_parts(curve.unstable):
             style = "-" if stable else (0, (4, 2))
             axes.plot(x[part], y[part], color=colour, linestyle=style, zorder=2)
-    for kind, place in curve.events:
-        axes.plot(place, _passage(x, y, place), marker=_EVENTS[kind], zorder=4, **_EVENT)
-
-
-def _passage(x: np.ndarray, y: np.ndarray, place: float) -> float:
-    """Ordinate where a path first passes an abscissa, or comes closest to it."""
-    crossed = np.flatnonzero((x[:-1] - place) * (x[1:] - place) <= 0)
-    if not len(crossed):
-        return float(y[np.abs(x - place).argmin()])
-    i = crossed[0]
-    part = 0.0 if x[i] == x[i + 1] else (place - x[i]) / (x[i + 1] - x[i])
-    return float(y[i] + part * (y[i + 1] - y[i]))
+    for kind, *place in curve.events:
+        axes.plot(*place, marker=_EVENTS[kind], zorder=4, **_EVENT)
 
 
 def _entries(curves: Sequence[PathCurve], labels: Sequence[str]) -> list[Line2D]:
@@ -143,16 +139,14 @@ def _entries(curves: Sequence[PathCurve], labels: Sequence[str]) -> list[Line2D]
     entries = []
     for label in labels:
         curve = next(curve for curve in curves if curve.label == label)
-        style = {"color": _colour(curve, labels)}
+        style: dict[str, Any] = {"color": _colour(curve, labels)}
         if curve.kind == "points":
             style |= {"marker": "o", "linestyle": "none", "markersize": 3.4}
         entries.append(Line2D([], [], label=label, **style))
     if any(np.any(np.asarray(curve.unstable) != 0) for curve in curves):
-        entries.append(
-            Line2D([], [], color="#777777", linestyle=(0, (4, 2)), label="unstable (hollow)")
-            if any(curve.kind == "points" for curve in curves)
-            else Line2D([], [], color="#777777", linestyle=(0, (4, 2)), label="unstable")
-        )
-    used = {kind for curve in curves for kind, _ in curve.events}
+        hollow = any(curve.kind == "points" for curve in curves)
+        text = "unstable (hollow)" if hollow else "unstable"
+        entries.append(Line2D([], [], color="#777777", linestyle=(0, (4, 2)), label=text))
+    used = {kind for curve in curves for kind, *_ in curve.events}
     marks = [kind for kind in _EVENTS if kind in used]
     return entries + [Line2D([], [], marker=_EVENTS[k], label=k, **_EVENT) for k in marks]
