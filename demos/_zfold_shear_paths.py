@@ -170,7 +170,8 @@ def follow(model, branch: Branch, towards=1.0, first: float = 0.005) -> Branch:
         branch.events += [placed(event, path.history["arc_length"], rows) for event in path.events]
         branch.bifurcations += path.bifurcations
         if abs(path.end.load - OPENED - stop) > TURNS_SHORT:
-            branch.ended = f"ends at d2 = {path.end.load - OPENED:.4f}"
+            turns = [event["d2"] for event in branch.events if event["kind"] == "limit point"]
+            branch.ended = f"turns back for good at d2 = {max(turns, default=np.nan):.4f}"
             break
         keep(model, branch, stop)
         towards = path.end.tangent

@@ -118,28 +118,24 @@ def distances(broken: Branch) -> tuple[float, float]:
 
 def text(verdict: Verdict) -> str:
     """One case in words."""
-    case, ends = verdict.case, verdict.ends
-    said = [f"{case.model}, eta = {case.eta:g}, nu = {case.nu:g}:"]
-    if verdict.unstable:
-        shown = ", ".join(f"{low:.4f} to {high:.4f}" for low, high in verdict.unstable)
-        said.append(f"the symmetric branch is unstable from d2 = {shown} and stable else;")
-    else:
-        said.append("the symmetric branch is stable throughout;")
+    case = verdict.case
+    shown = ", ".join(f"{low:.4f} to {high:.4f}" for low, high in verdict.unstable)
+    said = [
+        f"{case.model}, eta = {case.eta:g}, nu = {case.nu:g}: the symmetric branch is "
+        + (f"unstable from d2 = {shown}, else stable" if shown else "stable throughout")
+    ]
     if verdict.broken_from is None:
-        return " ".join([*said, "no broken branch was met."])
-    said.append(f"the broken one has stable states from d2 = {verdict.broken_from:.4f} on")
+        return f"{said[0]}; no broken branch was met."
+    said.append(f"the broken one has stable states from d2 = {verdict.broken_from:.4f}")
     if verdict.snap:
-        said.append(f"(followed from its bifurcation it snaps at {verdict.snap:.4f})")
+        said.append(f"and snaps at {verdict.snap:.4f} when it is followed from its bifurcation")
     if verdict.lower_from is not None:
-        said.append(f"and the lower energy from d2 = {verdict.lower_from:.4f} on;")
-    for name, run in ends.items():
+        said.append(f"it has the lower energy from d2 = {verdict.lower_from:.4f}")
+    for name, run in verdict.ends.items():
         gap = run["z_a"] - run["z_b"]
-        said.append(
-            f"{name} at d2 = {run['d2']:g}: energy {run['energy']:.4f}, z_a - z_b {gap:+.4f},"
-        )
-    said.append(f"broken profiles {verdict.point:.3f} W from point symmetry")
-    said.append(f"and {verdict.mirror:.3f} W from mirror symmetry.")
-    return " ".join(said)
+        said.append(f"{name} at {run['d2']:g}: energy {run['energy']:.4f}, z_a - z_b {gap:+.4f}")
+    off = f"{verdict.point:.3f} W from point and {verdict.mirror:.3f} W from mirror symmetry"
+    return "; ".join([*said, f"its edge profiles are {off}"]) + "."
 
 
 def account(verdicts: Sequence[Verdict], onsets: dict) -> list[str]:
@@ -170,7 +166,7 @@ def account(verdicts: Sequence[Verdict], onsets: dict) -> list[str]:
             f"{name}: the symmetric one has the lower energy up to d2 = {verdict.lower_from:.4f}, "
             "the broken one beyond.",
         ]
-    known = {key: value for key, value in onsets.items() if value is not None}
+    known = {key: onsets[key] for key in sorted(onsets) if onsets[key] is not None}
     if len(known) > 1:
         some = ", ".join(
             f"{value:.4f} at {eta:g} ({model})" for (model, eta), value in known.items()
