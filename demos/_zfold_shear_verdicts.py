@@ -166,10 +166,10 @@ def account(verdicts: Sequence[Verdict], onsets: dict) -> list[str]:
             f"{name}: the symmetric one has the lower energy up to d2 = {verdict.lower_from:.4f}, "
             "the broken one beyond.",
         ]
-    known = {key: onsets[key] for key in sorted(onsets) if onsets[key] is not None}
-    if len(known) > 1:
-        some = ", ".join(
-            f"{value:.4f} at {eta:g} ({model})" for (model, eta), value in known.items()
-        )
-        said.append(f"onset of instability against eta: {some}.")
+    if len(onsets) > 1:
+        places = [
+            f"{'not met' if d2 is None else format(d2, '.4f')} at {eta:g} ({model})"
+            for (model, eta), d2 in sorted(onsets.items())
+        ]
+        said.append(f"onset of the symmetric one's instability by eta: {', '.join(places)}.")
     return said
