@@ -50,6 +50,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "crease stiffness K_r W / (E h^3), one or several values",
     },
     "d1": {"type": number(0.0), "nargs": "+", "help": "openings, one or several values"},
+    "d2": {"type": number(0.0), "nargs": "+", "help": "shears, one or several values"},
     "nu": {"type": number(-1.0), "nargs": "+", "help": "Poisson's ratio, one or several values"},
     "h": {"type": number(0.0), "help": "thickness over panel width"},
     "size": {"type": number(0.0), "help": "length of the triangles' sides over panel width"},

@@ -10,12 +10,14 @@ from ufl_origami.plotting.charts import (
 )
 from ufl_origami.plotting.display import DisplayError, virtual_display
 from ufl_origami.plotting.energy_book import energy_book_chart
+from ufl_origami.plotting.paths import PathCurve, path_chart
 from ufl_origami.plotting.settling import settling_chart
 from ufl_origami.plotting.stills import Look, Sheet, film, still
 
 __all__ = [
     "DisplayError",
     "Look",
+    "PathCurve",
     "Series",
     "Sheet",
     "convergence_chart",
@@ -23,6 +25,7 @@ __all__ = [
     "film",
     "fold_angle_chart",
     "history_chart",
+    "path_chart",
     "profile_chart",
     "settling_chart",
     "stacked_chart",
