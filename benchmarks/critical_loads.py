@@ -62,7 +62,7 @@ FAMILIES = {
     ),
     "plate": Family(
         tuple(lambda choice, key=key: problems.plate(*key, choice) for key in problems.PLATES),
-        {"ddg": (8, 16, 32, 56), "fem": (4, 8, 16)},
+        {"ddg": (8, 16, 32, 48), "fem": (4, 8, 16)},
     ),
     "blade": Family((problems.blade,), {"ddg": (1, 2, 4), "fem": (1, 2)}),
 }

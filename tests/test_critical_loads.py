@@ -50,7 +50,7 @@ def test_plate(load, edges):
         ("pressed", "hinged", 20),
         ("pressed", "clamped", 40),
         ("sheared", "hinged", 36),
-        ("sheared", "clamped", 56),
+        ("sheared", "clamped", 48),
     ],
 )
 def test_plate_of_discrete_shell(load, edges, n):

@@ -133,14 +133,14 @@ def crease_column(eta: float, choice: Choice, *, h: float = 0.01) -> CriticalPro
     return CriticalProblem(f"crease column, eta = {eta:g}", scene, k**2)
 
 
-def plate(load: str, edges: str, choice: Choice, *, h: float = 0.01) -> CriticalProblem:
+def plate(load: str, edges: str, choice: Choice, *, h: float = 0.002) -> CriticalProblem:
     """Unit square held at its edges, under loads in its plane; nu = 0.3.
 
     Args:
         load: "pressed" along x, or "sheared".
         edges: "hinged" or "clamped".
         choice: model and mesh.
-        h: thickness.
+        h: thickness; at 0.01 the strain before buckling lowers the loads by up to 0.3 %.
     """
     _require((load, edges), PLATES)
     nu, sides = 0.3, ("x0", "x1", "y0", "y1")
