@@ -192,7 +192,8 @@ def landscape(
 
     Args:
         model: the model; its state is the end's afterwards.
-        start: unknowns of an equilibrium at the model's load factor.
+        start: unknowns of an equilibrium at the model's load factor, whose fold angles are within
+            half a turn of the model's own.
         end: those of another one.
         count: number of places.
         newton: tolerances.

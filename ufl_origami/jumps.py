@@ -129,7 +129,7 @@ def jump(
     """
     if side not in (1, -1):
         raise InputError(f"side {side} is neither 1 nor -1")
-    load, start = model.problem.time, model.x.copy()
+    load, start, memory = model.problem.time, model.x.copy(), model.problem.memory()
     (mode,) = modes(model, 1)
     if direction is None and mode.value >= 0:
         raise InputError(f"the state at {load:g} is stable: name a direction to push it")
@@ -145,8 +145,8 @@ def jump(
         return Jump(*np.array(log).T)
     except BaseException:
         start.copy(model.x)
+        model.problem.recall(memory)
         model.problem.set_time(load)
-        model.problem.accept(model.x)
         raise
 
 
