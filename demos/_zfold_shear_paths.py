@@ -13,7 +13,7 @@ from ufl_origami.discretise import build
 from ufl_origami.errors import BranchWarning, SolveError, StabilityWarning
 from ufl_origami.gather import gather_profile, gather_sheet
 from ufl_origami.material import Material
-from ufl_origami.paths import follow_path
+from ufl_origami.paths import PathResult, follow_path
 from ufl_origami.run import solve_static
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.continuation import ArcSettings, Event
@@ -25,7 +25,7 @@ OPENED = 1.0  # load factor up to which the edge moves by d1, beyond it by d2
 GAP = 1e-4  # paths by arc length keep off the bend of the motion at d2 = 0 by so much
 SMALL = 0.004  # shear at which pushes of families are let go
 MEASURES = ("d2", "energy", "z_a", "z_b", "force_x", "force_y", "unstable_directions")
-TURNS_SHORT = 1e-9
+CLOSE = 1e-9  # round-off of d2
 
 Row = dict[str, Any]
 
@@ -151,31 +151,36 @@ def pushed(case: Case, left: float, right: float, *, until: float):
 def follow(model, branch: Branch, towards=1.0, first: float = 0.005) -> Branch:
     """Follow a branch through the stops, from one to the next."""
     arc = ArcSettings(first=first, largest=0.05, load=0.02, steps=300)
-    low = OPENED + GAP
     start = model.problem.time - OPENED
-    for stop in [stop for stop in branch.case.stops if stop > start + TURNS_SHORT]:
-        rows = [branch.rows[-1]]
-
-        def on_accept(step, model, rows=rows):
-            rows.append(measure(model, step.negative_pivots))
-
-        ends = [OPENED + stop, low] if model.problem.time > low + GAP else [OPENED + stop]
+    for stop in [stop for stop in branch.case.stops if stop > start + CLOSE]:
         try:
-            path = follow_path(model, ends, towards=towards, arc=arc, on_accept=on_accept)
+            path = advance(model, branch, stop, towards, arc)
         except SolveError as error:
-            branch.ended = str(error)
+            branch.ended = f"ends: {error}"
             break
-        finally:
-            branch.rows += rows[1:]
-        branch.events += [placed(event, path.history["arc_length"], rows) for event in path.events]
-        branch.bifurcations += path.bifurcations
-        if abs(path.end.load - OPENED - stop) > TURNS_SHORT:
-            turns = [event["d2"] for event in branch.events if event["kind"] == "limit point"]
-            branch.ended = f"turns back for good at d2 = {max(turns, default=np.nan):.4f}"
+        if abs(path.end.load - OPENED - stop) > CLOSE:
+            branch.ended = f"does not reach d2 = {stop:g}: {path.reason}"
             break
         keep(model, branch, stop)
         towards = path.end.tangent
     return branch
+
+
+def advance(model, branch: Branch, stop: float, towards, arc: ArcSettings) -> PathResult:
+    """Follow a branch to a stop, or back to the beginning of the shear, with all that is met."""
+    rows = [branch.rows[-1]]
+
+    def on_accept(step, model):
+        rows.append(measure(model, step.negative_pivots))
+
+    ends = [OPENED + stop, OPENED + 0.5 * GAP]
+    try:
+        path = follow_path(model, ends, towards=towards, arc=arc, on_accept=on_accept)
+    finally:
+        branch.rows += rows[1:]
+    branch.events += [placed(event, path.history["arc_length"], rows) for event in path.events]
+    branch.bifurcations += path.bifurcations
+    return path
 
 
 def placed(event: Event, arcs: np.ndarray, rows: Sequence[Row]) -> Row:

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from _zfold_shear_paths import Branch, Case
+from _zfold_shear_paths import CLOSE, Branch, Case
 
 from ufl_origami.plotting.paths import stable_parts
 
 FINE = 1201
 """Places at which energies of two branches are compared."""
-
-CLOSE = 1e-9
-"""Round-off of d2."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ def judge(branches: Sequence[Branch]) -> Verdict:
     return Verdict(
         case=symmetric.case,
         onset=bifurcations[0] if bifurcations else None,
-        unstable=windows(symmetric, bifurcations),
+        unstable=windows(symmetric),
         broken_from=float(min([*limits, *stable])) if len(stable) else None,
         snap=limits[0] if limits else None,
         lower_from=lower_from(symmetric, broken) if broken else None,
@@ -73,10 +70,17 @@ def judge(branches: Sequence[Branch]) -> Verdict:
     )
 
 
-def windows(branch: Branch, bifurcations: Sequence[float]) -> list[tuple[float, float]]:
-    """Intervals of d2 between bifurcations, or to the end, in which a branch is unstable."""
-    ends = [*bifurcations, float(branch.column("d2")[-1])]
-    return list(zip(ends[0:-1:2], ends[1::2], strict=False))
+def windows(branch: Branch) -> list[tuple[float, float]]:
+    """Intervals of d2, in the order of the path, in which a branch is unstable."""
+    d2, unstable = branch.column("d2"), branch.column("unstable_directions")
+    found, start = [], d2[0] if unstable[0] else None
+    for event in branch.events:
+        if not event["before"] and event["after"]:
+            start = event["d2"]
+        elif event["before"] and not event["after"] and start is not None:
+            found.append((float(start), event["d2"]))
+            start = None
+    return found if start is None else [*found, (float(start), float(d2[-1]))]
 
 
 def least_energy(branch: Branch, d2: np.ndarray) -> np.ndarray:
@@ -96,6 +100,8 @@ def least_energy(branch: Branch, d2: np.ndarray) -> np.ndarray:
 def lower_from(symmetric: Branch, broken: Branch) -> float | None:
     """Shear beyond which stable broken states have less energy than symmetric ones."""
     at, energy = symmetric.column("d2"), symmetric.column("energy")
+    first = slice(int(np.argmax(np.append(np.diff(at) < 0, True))) + 1)  # up to its first turn
+    at, energy = at[first], energy[first]
     d2 = np.linspace(at[0], at[-1], FINE)
     higher = least_energy(broken, d2) >= np.interp(d2, at, energy)
     if higher[-1]:
