@@ -19,7 +19,7 @@ from ufl_origami.model import Model
 from ufl_origami.path_stops import PathStop
 from ufl_origami.paths import follow_path
 from ufl_origami.run import solve_static
-from ufl_origami.solvers.continuation import ArcSettings
+from ufl_origami.solvers.arc import ArcSettings
 from ufl_origami.solvers.newton import NewtonSettings
 from ufl_origami.solvers.static import Step, StepSettings
 

@@ -16,7 +16,7 @@ from ufl_origami.material import Material
 from ufl_origami.paths import PathResult, follow_path
 from ufl_origami.run import solve_static
 from ufl_origami.scene import Scene
-from ufl_origami.solvers.continuation import ArcSettings, Event
+from ufl_origami.solvers.arc import ArcSettings, Event
 
 W, E, H = 1.0, 1e7, 0.01  # width of a panel and length of the crease; Young's modulus; thickness
 UNIT = E * H**3 / W**3  # of pushes: force per area

@@ -15,7 +15,7 @@ import ufl_origami as uo
 from ufl_origami import demo
 from ufl_origami.scene import Scene
 from ufl_origami.scene_surroundings import Surroundings
-from ufl_origami.solvers.continuation import ArcSettings
+from ufl_origami.solvers.arc import ArcSettings
 from ufl_origami.solvers.dynamics import TimeSettings
 from ufl_origami.solvers.newton import NewtonSettings
 from ufl_origami.solvers.static import StepSettings

@@ -46,7 +46,7 @@ _HOMES = {
     "StabilityWarning": "errors",
     "RoundOffWarning": "errors",
     "SupportWarning": "errors",
-    "ArcSettings": "solvers.continuation",
+    "ArcSettings": "solvers.arc",
     "PathResult": "paths",
     "PathStop": "path_stops",
     "at_fold_angle": "path_stops",

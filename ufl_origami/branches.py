@@ -12,8 +12,8 @@ from ufl_origami.errors import InputError, SolveError
 from ufl_origami.model import Model
 from ufl_origami.path_stops import PathStop
 from ufl_origami.paths import PathResult, follow_path
+from ufl_origami.solvers.arc import Event, Metric
 from ufl_origami.solvers.bordered import Bordered, LoadFactor, Multiplier
-from ufl_origami.solvers.continuation import Event, Metric
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.stability import Mode, lowest_modes
 

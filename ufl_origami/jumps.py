@@ -20,7 +20,7 @@ from ufl_origami.model import Model
 from ufl_origami.motion import Motion
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.admissible import Admissible
-from ufl_origami.solvers.continuation import Metric
+from ufl_origami.solvers.arc import Metric
 from ufl_origami.solvers.dynamics import TimePath, TimeSettings, TimeStep
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.schemes import ImplicitEuler, Instant

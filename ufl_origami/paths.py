@@ -27,7 +27,8 @@ from ufl_origami.resolution import warn_round_off
 from ufl_origami.run import end_motion
 from ufl_origami.scene import Scene
 from ufl_origami.solvers.admissible import Admissible
-from ufl_origami.solvers.continuation import ArcPath, ArcPoint, ArcSettings, Event, Stop
+from ufl_origami.solvers.arc import ArcPoint, ArcSettings, Event
+from ufl_origami.solvers.continuation import ArcPath, Stop
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.static import Step
 from ufl_origami.supports import check_supports

@@ -19,7 +19,7 @@ from ufl_origami.mesh_shapes import rectangle
 from ufl_origami.meshing import mesh_pattern
 from ufl_origami.paths import PathResult, follow_path
 from ufl_origami.scene import Scene
-from ufl_origami.solvers.continuation import ArcSettings, Event
+from ufl_origami.solvers.arc import ArcSettings, Event
 
 E = 1e4
 

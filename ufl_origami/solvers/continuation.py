@@ -5,161 +5,31 @@ and is corrected in the hyperplane normal to it. The arc length is that of the d
 (root of their mean square over the sheet, over its diagonal), so that its unit is the same in
 every scene. Each accepted state knows the inertia of its own tangent: its number of negative
 eigenvalues at constant load and prescribed motion. Where that number or the direction of the load
-changes, the point between is sought.
+changes, the point between is sought (path_events.py).
 """
 
 import logging
 import time as clock
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from petsc4py import PETSc
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ufl_origami.errors import BranchWarning, InputError, SolveError
+from ufl_origami.errors import SolveError
 from ufl_origami.problem import Problem
+from ufl_origami.solvers.arc import ArcPoint, ArcSettings, Event, Metric
 from ufl_origami.solvers.bordered import Bordered, LoadFactor
-from ufl_origami.solvers.dynamics import sheet_size
-from ufl_origami.solvers.newton import NewtonSolver, area_weights
-from ufl_origami.solvers.stability import Mode, crossing_mode
+from ufl_origami.solvers.newton import NewtonSolver
+from ufl_origami.solvers.path_events import EVALUATIONS, EventSearch
 from ufl_origami.solvers.static import Check, Step
 
 log = logging.getLogger(__name__)
 
-EVALUATIONS = 60
-"""Points that the search for one event may take."""
-
-BESIDE = 1e-3
-"""Part of a step next to a limit point within which a change of inertia counts as its own."""
-
 ON_A_STOP = 1e-6
 """Part of the first step within which a path starts on a stop: as well as states are solved."""
-
-
-@dataclass(frozen=True)
-class ArcSettings:
-    """Steps along a path.
-
-    Attributes:
-        first: first step, in units of the load factor.
-        largest: longest step, arc length.
-        load: largest change of the load factor in one step.
-        shortest: a step below this part of the first one, or of the longest since, is given up.
-        growth: factor after an easy step.
-        easy: Newton iterations up to which a step is easy; above twice as many the next is shorter.
-        bend: largest angle (radians) between the directions at both ends of a step: a sharper bend
-            is taken in shorter steps, and may be the jump to another branch.
-        stray: largest distance of a state from the predicted one over the length of the step.
-        tolerance: length of the interval within which an event is located, over the step's.
-        steps: largest number of steps.
-        locate: whether limit points and bifurcations are sought.
-    """
-
-    first: float = 0.05
-    largest: float = 0.1
-    load: float = np.inf
-    shortest: float = 1e-5
-    growth: float = 1.5
-    easy: int = 5
-    bend: float = 0.5
-    stray: float = 0.5
-    tolerance: float = 1e-6
-    steps: int = 1000
-    locate: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse sizes that are none.
-
-        Raises:
-            InputError: naming the setting.
-        """
-        for name, value in vars(self).items():
-            if name != "locate" and not value > 0:
-                raise InputError(f"arc settings: {name} = {value} is not positive")
-        if self.growth < 1:
-            raise InputError(f"arc settings: growth {self.growth} is below 1")
-
-
-class Metric:
-    """Inner product of displacements: mean over the sheet, over its diagonal squared.
-
-    Args:
-        problem: terms and constraints.
-    """
-
-    def __init__(self, problem: Problem):
-        self.weights = area_weights(problem.configuration, angles=False)
-        self.diagonal = sheet_size(problem)
-        self.weights.scale(3.0 / (self.weights.sum() * self.diagonal**2))
-
-    def row(self, vector: PETSc.Vec) -> PETSc.Vec:
-        """Coefficients of the product with a vector."""
-        out = vector.duplicate()
-        out.pointwiseMult(self.weights, vector)
-        return out
-
-    def dot(self, one: PETSc.Vec, other: PETSc.Vec) -> float:
-        """Product of two vectors of unknowns."""
-        return self.row(one).dot(other)
-
-    def norm(self, vector: PETSc.Vec) -> float:
-        """Length of a vector."""
-        return float(np.sqrt(self.dot(vector, vector)))
-
-    def distance(self, one: PETSc.Vec, other: PETSc.Vec) -> float:
-        """Length of the difference of two vectors."""
-        difference = one.copy()
-        difference.axpy(-1.0, other)
-        return self.norm(difference)
-
-
-class ArcPoint(NamedTuple):
-    """A point of a path.
-
-    Attributes:
-        x: unknowns.
-        load: load factor.
-        arc: arc length from the start.
-        tangent: change of the unknowns with the arc length.
-        slope: change of the load factor with it.
-        pivots: negative pivots of the tangent stiffness, None where unknown.
-    """
-
-    x: PETSc.Vec
-    load: float
-    arc: float
-    tangent: PETSc.Vec
-    slope: float
-    pivots: int | None
-
-
-@dataclass(frozen=True)
-class Event:
-    """A limit point or a bifurcation.
-
-    Attributes:
-        kind: "limit point" or "bifurcation".
-        load: load factor.
-        arc: arc length at which it lies.
-        before: negative pivots before it, None where unknown.
-        after: negative pivots after it.
-        x: unknowns; None where a resumed run has forgotten them.
-        mode: the critical eigenvector, of length 1 by the path's metric; None where there is none.
-        memory: branches of angles of the accepted state before, from which `x` counts its own.
-    """
-
-    kind: str
-    load: float
-    arc: float
-    before: int | None
-    after: int | None
-    x: PETSc.Vec | None
-    mode: PETSc.Vec | None = None
-    memory: list[dict[str, np.ndarray]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -213,6 +83,8 @@ class ArcPath:
     def __post_init__(self) -> None:
         self.bordered = Bordered(self.newton, LoadFactor(self.problem))
         self.metric = Metric(self.problem)
+        tolerance = self.settings.tolerance
+        self.search = EventSearch(self.problem, self.metric, tolerance, self._between)
         self._iterations = self._factorisations = 0
 
     def start(self, x: PETSc.Vec, load: float, towards: PETSc.Vec | float) -> ArcPoint:
@@ -280,7 +152,7 @@ class ArcPath:
             self._iterations = self._factorisations = 0
             new, cuts, stopped = self._advance(point, stops, before)
             if self.settings.locate:
-                self._look_for_events(point, new)
+                self.events += self.search.find(point, new)
             step = Step(
                 number=len(self.steps) + 1,
                 time=new.load,
@@ -415,82 +287,3 @@ class ArcPath:
         if old.arc == 0.0 and size <= ON_A_STOP * length:
             return None
         return self._between(old, size) if size < length else new
-
-    def _look_for_events(self, old: ArcPoint, new: ArcPoint) -> None:
-        """Locate the limit points and bifurcations of one step.
-
-        The inertia counts eigenvalues that change sign. What changes at the turn of the load is
-        told apart from what changes before and after it.
-        """
-        found: list[Event] = []
-        ends = [old, new]
-        try:
-            if old.slope * new.slope < 0:
-                limit, low, high = self._limit_point(old, new)
-                found.append(limit)
-                ends = [old, low, high, new]
-            for first, last in zip(ends[::2], ends[1::2], strict=True):
-                found += self._bifurcations(old, first, last)
-        except SolveError as error:
-            text = f"an event between load factors {old.load:g} and {new.load:g} was not located"
-            warnings.warn(f"{text}: {error.reason}", BranchWarning, stacklevel=2)
-        self.events += sorted(found, key=lambda event: event.arc)
-        self.problem.set_time(new.load)
-
-    def _limit_point(self, old: ArcPoint, new: ArcPoint) -> tuple[Event, ArcPoint, ArcPoint]:
-        """Where the load factor turns, and points close before and behind it."""
-        length = new.arc - old.arc
-        points = {0.0: old, length: new}
-
-        def point(size: float) -> ArcPoint:
-            if size not in points:
-                points[size] = self._between(old, size)
-            return points[size]
-
-        tolerance = self.settings.tolerance * length
-        size = brentq(
-            lambda size: point(size).slope, 0.0, length, xtol=tolerance, maxiter=EVALUATIONS
-        )
-        at, beside = point(size), max(BESIDE * length, 10 * tolerance)
-        low, high = point(max(size - beside, 0.0)), point(min(size + beside, length))
-        memory = self.problem.memory()
-        args = (at.load, at.arc, low.pivots, high.pivots, at.x)
-        return Event("limit point", *args, memory=memory), low, high
-
-    def _bifurcations(self, old: ArcPoint, first: ArcPoint, last: ArcPoint) -> list[Event]:
-        """Where eigenvalues pass zero between two points of the step that starts at `old`."""
-        found: list[Event] = []
-        before, after = first.pivots, last.pivots
-        if before is None or after is None:
-            return found
-        for level in range(min(before, after), max(before, after)):
-            point, mode = self._crossing(old, first, last, level)
-            counts = (level, level + 1) if after > before else (level + 1, level)
-            mode.vector.scale(1.0 / self.metric.norm(mode.vector))
-            args = (point.load, point.arc, *counts, point.x, mode.vector)
-            found.append(Event("bifurcation", *args, memory=self.problem.memory()))
-        return found
-
-    def _crossing(
-        self, old: ArcPoint, first: ArcPoint, last: ArcPoint, level: int
-    ) -> tuple[ArcPoint, Mode]:
-        """Where the eigenvalue above `level` others passes zero, by secants within bisection."""
-        low, high = first.arc - old.arc, last.arc - old.arc
-        values: list[float | None] = [None, None]
-        tolerance = self.settings.tolerance * (high - low)
-        for _ in range(EVALUATIONS):
-            middle = 0.5 * (low + high)
-            one, other = values
-            if one is not None and other is not None and one * other < 0:
-                secant = low + (high - low) * one / (one - other)
-                margin = 0.05 * (high - low)
-                middle = secant if low + margin < secant < high - margin else middle
-            point = self._between(old, middle)
-            mode = crossing_mode(self.problem, point.x, point.load, level, point.pivots or 0)
-            if ((point.pivots or 0) > level) == ((first.pivots or 0) > level):
-                low, values[0] = middle, mode.value
-            else:
-                high, values[1] = middle, mode.value
-            if high - low < tolerance or abs(mode.value) < 1e-12:
-                break
-        return point, mode
