@@ -56,3 +56,26 @@ def test_stable_states_and_wrong_sides_are_refused(unstable):
     model, _ = unstable
     with pytest.raises(uo.InputError, match="neither 1 nor -1"):
         uo.jump(model, side=0)
+
+
+@pytest.mark.parametrize("model", ["ddg", "fem"])
+def test_a_free_hinge_is_neutral_and_a_spring_stable(model):
+    scene = uo.Scene(
+        uo.mesh_pattern(uo.gallery.z_fold(1.0, 1.0, included_angle=90.0), 0.5),
+        uo.Material(E, 0.3, 0.1),
+        model=model,
+    )
+    scene.fix("left")
+    scene.crease("crease", 0.0)
+    assert uo.verdict(uo.build(scene)) == "neutral"
+    scene.creases.clear()
+    scene.crease("crease", 0.01)
+    assert uo.verdict(uo.build(scene)) == "stable"
+
+
+def test_the_middle_state_is_unstable(unstable):
+    model, start = unstable
+    start.copy(model.x)
+    model.problem.set_time(0.5)
+    model.problem.accept(model.x)
+    assert uo.verdict(model) == "unstable"

@@ -61,6 +61,7 @@ _HOMES = {
     "restore": "branches",
     "stability": "branches",
     "switch_branch": "branches",
+    "verdict": "branches",
     "build": "discretise",
     "mesh_pattern": "meshing",
     "read_fold": "fold_io",

@@ -15,7 +15,7 @@ from ufl_origami.paths import PathResult, follow_path
 from ufl_origami.solvers.arc import Event, Metric
 from ufl_origami.solvers.bordered import Bordered, LoadFactor, Multiplier
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
-from ufl_origami.solvers.stability import Mode, lowest_modes
+from ufl_origami.solvers.stability import ZERO, Mode, lowest_modes
 
 HALVINGS = 6
 """Tries of `switch_branch`, each half as far from the bifurcation as the one before."""
@@ -29,6 +29,26 @@ def stability(model: Model) -> int | None:
     """
     with _solver(model) as bordered:
         return bordered.factor(model.x)
+
+
+def verdict(model: Model) -> str:
+    """Whether a model's equilibrium is "stable", "neutral", "unstable" or "unknown"; collective.
+
+    Neutral: the lowest eigenvalue is zero but for round-off, as at a limit point, a bifurcation, or
+    where a free hinge lets a panel turn. The pivots alone count such a direction as unstable or
+    not by chance; here the eigenvalues nearest to zero are looked at.
+
+    Raises:
+        SolveError: SLEPc did not converge.
+    """
+    pivots = stability(model)
+    if pivots is None:
+        return "unknown"
+    lowest = lowest_modes(model.problem, model.x, model.problem.time, pivots + 2, pivots)
+    zero = ZERO * max(abs(mode.value) for mode in lowest)
+    if lowest[0].value < -zero:
+        return "unstable"
+    return "neutral" if lowest[0].value <= zero else "stable"
 
 
 def modes(model: Model, count: int = 1) -> list[Mode]:

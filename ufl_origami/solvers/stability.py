@@ -7,8 +7,10 @@ factorisation has negative pivots.
 
 from dataclasses import dataclass
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
+import numpy as np
 from slepc4py import SLEPc
 
 from ufl_origami.errors import SolveError
@@ -22,6 +24,12 @@ PREFIX = "ufl_origami_modes_"
 TOLERANCE = 1e-10
 """Relative error of an eigenvalue."""
 
+
+BESIDE = 1e-13
+"""Distance of the shift from zero over the largest ratio of diagonal to weight.
+
+At zero itself a singular tangent could not be factored.
+"""
 
 ZERO = 1e-9
 """Eigenvalue over the largest of those found, below which its sign may be round-off."""
@@ -58,24 +66,33 @@ def nearest_modes(problem: Problem, x: PETSc.Vec, load: float, count: int) -> li
     problem.linearise(None, x)
     matrix = problem.stiffness(x)
     problem.constrain(matrix, None, None)
+    diagonal, ratio = shift_weights(problem), matrix.getDiagonal()
     weights = PETSc.Mat().createAIJ(matrix.getSizes(), nnz=1, comm=matrix.comm)
-    weights.setDiagonal(shift_weights(problem))
+    weights.setDiagonal(diagonal)
     weights.assemble()
     solver = SLEPc.EPS().create(matrix.comm)
     try:
-        return _solve(solver, matrix, weights, min(count, problem.configuration.size_global))
+        ratio.pointwiseDivide(ratio, diagonal)
+        free = np.isfinite(ratio.array_r)
+        largest = problem.configuration.comm.allreduce(
+            ratio.array_r[free].max(initial=0.0), MPI.MAX
+        )
+        count = min(count, problem.configuration.size_global)
+        return _solve(solver, matrix, weights, count, -BESIDE * largest)
     finally:
         solver.destroy()
         weights.destroy()
 
 
-def _solve(solver: SLEPc.EPS, matrix: PETSc.Mat, weights: PETSc.Mat, count: int) -> list[Mode]:
-    """Shift-and-invert at zero: prescribed unknowns have infinite eigenvalues there."""
+def _solve(
+    solver: SLEPc.EPS, matrix: PETSc.Mat, weights: PETSc.Mat, count: int, target: float
+) -> list[Mode]:
+    """Shift-and-invert just below zero; prescribed unknowns have infinite eigenvalues."""
     solver.setOptionsPrefix(PREFIX)
     solver.setOperators(matrix, weights)
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setDimensions(count)
-    solver.setTarget(0.0)
+    solver.setTarget(target)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTolerances(TOLERANCE, 200)
     transform = solver.getST()
