@@ -301,12 +301,13 @@ def test_two_references_of_a_problem_agree(problem, columns, tolerance):
 
 def test_every_table_names_its_source():
     files = sorted(REFERENCE.glob("*.csv"))
-    assert len(files) == 8
+    assert len(files) == 10
     for file in files:
         table = read_table(file)
         assert {"source", "problem"} <= set(table.head)
         load = next(iter(table.columns.values()))
-        assert load[-1] == 1 and np.all(np.diff(load) > 0)
+        rises = np.all(np.diff(load) > 0)
+        assert not rises if "roof" in file.name else rises and load[-1] == 1
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,7 @@ class StaticPath:
     size: float | None = None
     _unstable: int = 0
     _effort: int = 0
+    _settled: bool = False
     _warnings: list[Warning] = field(default_factory=list)
 
     def run(
@@ -152,6 +153,7 @@ class StaticPath:
         time, size = start, self.size or self.settings.first
         self.newton.allowed = 0
         self._unstable = self._factor_at(x, time) or 0
+        self._settled = self._in_equilibrium(x)
         for stop in stops:
             while time < stop - 1e-12 * max(1.0, abs(stop)):
                 target = stop if time + 1.001 * size >= stop else time + size
@@ -222,12 +224,14 @@ class StaticPath:
         self._effort = report.iterations
         self.newton.report = NewtonReport()
         self.newton.allowed = 0
-        negative, back = self._adopt(x, trial, time, target, doubtful=report.strayed > DOUBTFUL)
+        doubtful = self._settled and report.strayed > DOUBTFUL
+        negative, back = self._adopt(x, trial, time, target, doubtful=doubtful)
+        self._settled = True
         step = Step(
             number=len(self.steps) + 1,
             time=target,
             size=target - time,
-            iterations=iterations,
+            iterations=iterations + self.newton.report.iterations,
             factorisations=factorisations + self.newton.report.factorisations,
             negative_pivots=negative,
             seconds=clock.perf_counter() - begin,
@@ -238,6 +242,12 @@ class StaticPath:
         self._warnings = remarks(step, far=far or not back)
         PETSc.garbage_cleanup(x.comm)  # on several ranks Python's dropped vectors stay until here
         return step
+
+    def _in_equilibrium(self, x: PETSc.Vec) -> bool:
+        """Whether the start is an equilibrium: what a scene holds from the first may have moved."""
+        residual = x.duplicate()
+        self.problem.residual(x, residual)
+        return residual.norm() <= self.newton.tolerance()
 
     def _adopt(
         self, x: PETSc.Vec, trial: PETSc.Vec, time: float, target: float, *, doubtful: bool
@@ -264,16 +274,14 @@ class StaticPath:
         than the new state's own tangent says, the way back is solved for.
         """
         target = self.problem.time
+        self.newton.report.iterations += 1
         step = self._predict(new, time)
         guess = new.copy()
         guess.axpy(1.0, step)
         length = self._length(x, new)
         if length > JUMPED * self._length(new, guess):
-            report = self.newton.report
-            self.newton.report = NewtonReport()
             found = self.newton.solve(guess, new, search=False)
             same = found.converged and self._length(guess, x) < SAME * length
-            self.newton.report = report
         else:
             same = True
         self._factor_at(new, target)
