@@ -27,7 +27,6 @@ def test_euler_column(ends, model, n):
     assert_critical(problems.column(ends, Choice(model, n)))
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize("eta", ETA)
 @pytest.mark.parametrize(("model", "n"), [("ddg", 8), ("fem", 2)])
 def test_crease_column(eta, model, n):

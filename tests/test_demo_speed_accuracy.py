@@ -257,6 +257,7 @@ def test_charts_are_drawn(quick):
     assert all(is_drawn(quick[0] / f"{name}.png") for name in names)
 
 
+@pytest.mark.slow
 def test_two_ranks_find_the_same_errors(quick, tmp_path):
     done = demo(tmp_path, "--quick", "--problem", "z_fold", "--method", "director", ranks=2)
     assert done.returncode == 0, done.stderr

@@ -9,8 +9,6 @@ from run_scenes import crush
 
 import ufl_origami as uo
 
-pytestmark = pytest.mark.mpi
-
 HEIGHT, CEILING, REACH = 0.2, 0.1, 0.02
 MODELS = ["ddg", "fem"]
 ARC = uo.ArcSettings(first=0.1)
@@ -78,6 +76,7 @@ def test_a_path_may_start_on_a_stop_and_meets_it_again():
     assert again.model.position("A")[2] > first.history["position_A_z"][-1] + 0.05
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("model", MODELS)
 def test_stop_at_a_gap(model):
     path = uo.follow_path(under_a_ceiling(model), [uo.at_gap("ceiling", 0.03)], arc=QUICK)
@@ -104,6 +103,7 @@ def test_contact_during_a_path(model):
     assert history["stability"][-1] == "stable"
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("model", MODELS)
 def test_resumed_beyond_a_limit_point_bit_for_bit(comm, tmp_path_factory, model):
     """History, unknowns and direction of the path, in serial; to round-off among ranks."""
@@ -135,6 +135,7 @@ def test_resumed_beyond_a_limit_point_bit_for_bit(comm, tmp_path_factory, model)
         uo.restore(again.model, again.events[0])
 
 
+@pytest.mark.mpi
 def test_a_path_that_cannot_go_on_tells_why_and_keeps_its_steps(comm, tmp_path_factory):
     """The sheet is crushed to a tenth of its area at load factor 0.9 / 0.95."""
     folder, accepted = folder_of(comm, tmp_path_factory, "crush"), []

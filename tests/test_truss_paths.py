@@ -15,8 +15,6 @@ from scipy.interpolate import CubicSpline
 
 import ufl_origami as uo
 
-pytestmark = pytest.mark.mpi
-
 HEIGHT = 4.0
 STEEP = {"h": 1.4, "depth": 4.0}
 RADIUS = np.sqrt(HEIGHT**2 - 2.0)
@@ -104,6 +102,7 @@ def test_both_sides_of_a_bifurcation_mirror_each_other(steep):
     assert ends[0][2] == pytest.approx(ends[1][2], rel=1e-6)
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("model", MODELS)
 def test_load_control_jumps_and_says_so(model):
     scene = shallow(model)
@@ -115,6 +114,7 @@ def test_load_control_jumps_and_says_so(model):
     assert result.history["stability"][-1] == "stable"
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("model", MODELS)
 def test_path_is_the_same_alone_and_among_ranks(model):
     paths = [
