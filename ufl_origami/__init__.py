@@ -56,7 +56,7 @@ _HOMES = {
     "follow_branch": "branches",
     "follow_path": "paths",
     "jump": "jumps",
-    "landscape": "branches",
+    "landscape": "landscapes",
     "modes": "branches",
     "restore": "branches",
     "stability": "branches",

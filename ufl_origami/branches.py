@@ -1,7 +1,6 @@
 """Other branches of a path: eigenvectors, switching at bifurcations, energy between two states."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 from petsc4py import PETSc
@@ -13,7 +12,7 @@ from ufl_origami.model import Model
 from ufl_origami.path_stops import PathStop
 from ufl_origami.paths import PathResult, follow_path
 from ufl_origami.solvers.arc import Event, Metric
-from ufl_origami.solvers.bordered import Bordered, LoadFactor, Multiplier
+from ufl_origami.solvers.bordered import Bordered, LoadFactor
 from ufl_origami.solvers.newton import NewtonSettings, NewtonSolver
 from ufl_origami.solvers.stability import ZERO, Mode, lowest_modes
 
@@ -173,86 +172,3 @@ def follow_branch(
     """
     way = switch_branch(model, event, side=side, size=size, newton=options.get("newton"))
     return follow_path(model, stops, towards=way, **options)
-
-
-@dataclass(frozen=True)
-class Landscape:
-    """Energy between two states at one load factor.
-
-    Attributes:
-        places: (n,) part of the way, from 0 to 1.
-        energies: (n,) least potential energy at each.
-        forces: (n,) generalised force that holds the sheet there, positive towards 1.
-    """
-
-    places: np.ndarray
-    energies: np.ndarray
-    forces: np.ndarray
-
-    @property
-    def barrier(self) -> float:
-        """Height of the highest place above the start."""
-        return float(self.energies.max() - self.energies[0])
-
-
-def landscape(
-    model: Model,
-    start: PETSc.Vec,
-    end: PETSc.Vec,
-    count: int = 21,
-    *,
-    newton: NewtonSettings | None = None,
-    on_state: Callable[[float, Model], None] | None = None,
-) -> Landscape:
-    """Potential energy on the way from one state to another at the model's load factor; collective.
-
-    The displacements' component along the straight way (by nodal area) is prescribed step by step,
-    all else is in equilibrium: where the force vanishes is an equilibrium, and between two stable
-    ones the highest place is an upper bound of the lowest barrier.
-
-    Args:
-        model: the model; its state is the end's afterwards.
-        start: unknowns of an equilibrium at the model's load factor, whose fold angles are within
-            half a turn of the model's own.
-        end: those of another one.
-        count: number of places.
-        newton: tolerances.
-        on_state: called with each place and the model in its state.
-
-    Raises:
-        InputError: the states are one, or fewer than two places.
-        SolveError: no equilibrium was found at a place.
-    """
-    metric, load = Metric(model.problem), model.problem.time
-    way = end.copy()
-    way.axpy(-1.0, start)
-    length = metric.norm(way)
-    if count < 2 or length == 0.0:
-        raise InputError("a landscape needs two places and two different states")
-    row = metric.row(way)
-    row.array_w[model.problem.constraints.dofs] = 0.0
-    row.scale(1.0 / row.dot(way))
-    start.copy(model.x)
-    places, energies, forces = np.linspace(0.0, 1.0, count), [], []
-    solver = NewtonSolver(model.problem, newton)
-    try:
-        model.problem.set_time(load)
-        model.problem.accept(model.x)
-        model.problem.forces(model.x, model.x.duplicate())
-        bordered, factor = Bordered(solver, Multiplier(model.problem, row)), 0.0
-        for place in places:
-            guess = model.x.copy()
-            guess.axpy(place - row.dot(guess) + row.dot(start), way)
-            report = bordered.solve(guess, factor, row, model.x)
-            if not report.converged:
-                raise SolveError(f"landscape at {place:g} of the way: {report.reason}", load)
-            guess.copy(model.x)
-            model.problem.accept(model.x)
-            factor = report.value
-            energies.append(model.problem.potential(model.x))
-            forces.append(factor)
-            if on_state:
-                on_state(float(place), model)
-    finally:
-        solver.close()
-    return Landscape(places, np.array(energies), np.array(forces))
