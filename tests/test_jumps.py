@@ -79,3 +79,16 @@ def test_the_middle_state_is_unstable(unstable):
     model.problem.set_time(0.5)
     model.problem.accept(model.x)
     assert uo.verdict(model) == "unstable"
+
+
+@pytest.mark.parametrize("model", ["ddg", "fem"])
+@pytest.mark.parametrize(("stiffness", "verdict"), [(0.0, "neutral"), (0.01, "stable")])
+def test_a_path_tells_free_hinges_from_springs(model, stiffness, verdict):
+    """A panel with a loose flap is stretched."""
+    sheet = uo.mesh_pattern(uo.gallery.z_fold(1.0, 1.0, included_angle=90.0), 0.5)
+    scene = uo.Scene(sheet, uo.Material(E, 0.3, 0.1), model=model)
+    scene.crease("crease", stiffness)
+    scene.fix("left_edge")
+    scene.move("crease", x=lambda t: 0.02 * t, y=0.0, z=0.0)
+    path = uo.follow_path(scene, [0.1], arc=uo.ArcSettings(first=0.1))
+    assert set(path.history["stability"]) == {verdict}

@@ -11,7 +11,7 @@ The columns, in this fixed order (those that do not apply are left out):
 | factorisations | factorisations, those of failed tries included |
 | cuts | failed tries before the step |
 | negative_pivots | inertia of the tangent at the state, empty where unknown |
-| stability | stable, unstable or unknown |
+| stability | stable, neutral (by `follow_path`), unstable or unknown |
 | seconds | wall-clock time of the step |
 | energy_KIND | energies: membrane, bending, crease, load |
 | energy_total | their sum, the potential energy |

@@ -203,7 +203,7 @@ class _PathRun:
     def columns(self) -> Row:
         """Columns of the last step, arc length, events so far, and energies."""
         point, steps = self.point, self.path.steps
-        start = Step(0, point.load, 0.0, 0, 0, point.pivots, 0.0, 0)
+        start = Step(0, point.load, 0.0, 0, 0, point.pivots, 0.0, 0, point.neutral)
         kinds = [event.kind for event in self.path.events]
         own: Row = {
             "arc_length": point.arc,
@@ -221,7 +221,7 @@ class _PathRun:
         """Steps, events without their states, and where the path is."""
         point, path = self.point, self.path
         return {
-            "path": [point.load, point.arc, point.slope, point.pivots],
+            "path": [point.load, point.arc, point.slope, point.pivots, point.neutral],
             "steps": list(map(asdict, path.steps)),
             "size": path.size,
             "longest": path.longest,
@@ -231,8 +231,8 @@ class _PathRun:
 
     def recall(self, memory: Memory, vectors: dict[str, PETSc.Vec]) -> None:
         """Take up the path."""
-        path, (load, arc, slope, pivots) = self.path, memory["path"]
-        path.point = ArcPoint(self.model.x.copy(), load, arc, vectors["tangent"], slope, pivots)
+        path, (load, arc, *rest) = self.path, memory["path"]
+        path.point = ArcPoint(self.model.x.copy(), load, arc, vectors["tangent"], *rest)
         path.steps[:] = [Step(**step) for step in memory["steps"]]
         path.size, path.longest = memory["size"], memory["longest"]
         path.reason = memory["reason"]

@@ -100,6 +100,7 @@ class ArcPoint(NamedTuple):
         tangent: change of the unknowns with the arc length.
         slope: change of the load factor with it.
         pivots: negative pivots of the tangent stiffness, None where unknown.
+        neutral: whether an eigenvalue is zero but for round-off.
     """
 
     x: PETSc.Vec
@@ -108,6 +109,7 @@ class ArcPoint(NamedTuple):
     tangent: PETSc.Vec
     slope: float
     pivots: int | None
+    neutral: bool = False
 
 
 @dataclass(frozen=True)

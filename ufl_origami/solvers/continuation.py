@@ -119,7 +119,8 @@ class ArcPath:
         ahead = towards if np.isscalar(towards) else self.metric.dot(towards, tangent)
         slope = float(np.copysign(1.0 / length, ahead))
         tangent.scale(slope)
-        return ArcPoint(x, load, arc, tangent, slope, pivots)
+        neutral = pivots is not None and self.newton.singular()
+        return ArcPoint(x, load, arc, tangent, slope, pivots, neutral)
 
     def run(
         self, stops: Sequence[Stop], on_accept: OnAccept | None = None, turns: int | None = None
@@ -160,6 +161,7 @@ class ArcPath:
                 iterations=self._iterations,
                 factorisations=self._factorisations,
                 negative_pivots=new.pivots,
+                neutral=new.neutral,
                 seconds=clock.perf_counter() - begin,
                 cuts=cuts,
             )

@@ -35,7 +35,7 @@ class Factorisation:
 
     def __init__(self, ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool):
         self.ksp, self.matrix, self.symmetric = ksp, matrix, symmetric
-        self.count = 0
+        self.count = self.zero_pivots = 0
 
     def factor(self) -> int | None:
         """Factor the matrix as it is now; number of negative pivots, None where unknown.
@@ -93,6 +93,7 @@ class Factorisation:
         if not self.symmetric or self.ksp.pc.getType() != PETSc.PC.Type.CHOLESKY:
             return None
         negative, zero, _ = self.ksp.pc.getFactorMatrix().getInertia()
+        self.zero_pivots = zero
         return negative + zero
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:

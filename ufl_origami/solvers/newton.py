@@ -32,6 +32,9 @@ SHIFT_FACTOR = 8.0
 SHIFT_TRIES = 40
 """Shifts that the guard tries at one tangent."""
 
+SINGULAR = 1e-13
+"""Eigenvalue over the largest ratio of tangent diagonal to weight, below which it is round-off."""
+
 CYCLE = 4
 """Iterations after which one that has not reduced the residual counts as part of a cycle."""
 
@@ -293,7 +296,29 @@ class NewtonSolver:
             if self._guard and shift and found and found > self.allowed:
                 self._raise_shift(linear)
         self.report.factorisations += linear.count
+        self.linear.zero_pivots = linear.zero_pivots
         return found
+
+    def singular(self) -> bool:
+        """Whether the tangent last factored has an eigenvalue that is zero but for round-off.
+
+        By the factorisation's own count, or by two steps of inverse iteration.
+        """
+        if self.linear.zero_pivots:
+            return True
+        weights, matrix = self._shift_weights, self.problem.tangent.matrix
+        ratio = matrix.getDiagonal()
+        ratio.pointwiseDivide(ratio, weights)
+        first, second, load = weights.duplicate(), weights.duplicate(), weights.copy()
+        first_entry = weights.getOwnershipRange()[0]
+        load.array_w[:] *= np.cos(first_entry + np.arange(len(load.array_r)))
+        self.linear.solve(load, first)
+        load.pointwiseMult(weights, first)
+        self.linear.solve(load, second)
+        square = second.copy()
+        square.pointwiseMult(weights, second)
+        nearest = abs(second.dot(load) / square.dot(second))
+        return bool(nearest <= SINGULAR * ratio.norm(PETSc.NormType.INFINITY))
 
     def _raise_shift(self, linear: Factorisation) -> None:
         matrix = linear.matrix

@@ -82,6 +82,7 @@ class Step:
         negative_pivots: inertia of the tangent at the state, None where unknown.
         seconds: wall-clock time of the step.
         cuts: failed tries before it.
+        neutral: whether an eigenvalue is zero but for round-off; looked at on paths by arc length.
     """
 
     number: int
@@ -92,12 +93,19 @@ class Step:
     negative_pivots: int | None
     seconds: float
     cuts: int
+    neutral: bool = False
 
     @property
     def stability(self) -> str:
-        """One of "stable", "unstable", "unknown"."""
+        """One of "stable", "neutral", "unstable", "unknown".
+
+        The sign of a pivot that is zero but for round-off is that of chance: one of them does not
+        make a neutral state unstable.
+        """
         if self.negative_pivots is None:
             return "unknown"
+        if self.neutral and self.negative_pivots <= 1:
+            return "neutral"
         return "unstable" if self.negative_pivots else "stable"
 
 
