@@ -133,6 +133,7 @@ def test_claims_are_printed_with_their_bounds(quick):
         assert 0 < float(value) < float(bound)
 
 
+@pytest.mark.slow
 def test_two_ranks_make_the_same_motion(quick, histories, tmp_path):
     out, (run,) = demo(tmp_path, "--quick", "--model", "ddg", "--turns", "0.1", ranks=2)
     assert out.count("ddg: ") == 1

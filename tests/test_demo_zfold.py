@@ -136,6 +136,7 @@ def test_wrong_values_end_with_the_usage(tmp_path):
     assert done.returncode == 2 and "usage: ./run demo zfold_tension" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_fem_model_gives_the_same_outputs_on_two_ranks(tmp_path):
     """One case with the model's own mesh, near the elastica; ddg's choice is left empty."""
     done = demo(tmp_path, "--quick", "--model", "fem", ranks=2)

@@ -87,6 +87,7 @@ def test_console_judges_the_account_and_figures_are_drawn(quick):
     assert {file.stem for file in folder.glob("*.png")} == names | {"paths"}
 
 
+@pytest.mark.slow
 def test_without_stiffness_there_are_three_families_on_two_ranks(tmp_path):
     """Unperturbed panels bulge down and stay symmetric, stable and lowest in energy at first."""
     words = "--quick --model ddg --eta 0 --d2 0.03 --size 0.25".split()
