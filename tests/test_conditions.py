@@ -13,7 +13,7 @@ from ufl_origami.material import Material
 from ufl_origami.model import place_vertices
 from ufl_origami.scene import Scene
 from ufl_origami.sheet import sheet_from_arrays
-from ufl_origami.solvers.newton import shift_weights
+from ufl_origami.solvers.weights import shift_weights
 
 pytestmark = pytest.mark.mpi
 

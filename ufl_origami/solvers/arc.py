@@ -10,7 +10,7 @@ import numpy as np
 from ufl_origami.errors import InputError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.dynamics import sheet_size
-from ufl_origami.solvers.newton import area_weights
+from ufl_origami.solvers.weights import area_weights
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from ufl_origami.solvers.arc import ArcPoint, ArcSettings, Event, Metric
 from ufl_origami.solvers.bordered import Bordered, LoadFactor
 from ufl_origami.solvers.newton import NewtonSolver
 from ufl_origami.solvers.path_events import EVALUATIONS, EventSearch
+from ufl_origami.solvers.stability import singular
 from ufl_origami.solvers.static import Check, Step
 
 log = logging.getLogger(__name__)
@@ -119,7 +120,7 @@ class ArcPath:
         ahead = towards if np.isscalar(towards) else self.metric.dot(towards, tangent)
         slope = float(np.copysign(1.0 / length, ahead))
         tangent.scale(slope)
-        neutral = pivots is not None and self.newton.singular()
+        neutral = pivots is not None and singular(self.newton)
         return ArcPoint(x, load, arc, tangent, slope, pivots, neutral)
 
     def run(

@@ -15,11 +15,11 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_origami.configuration import MIDDLE, Configuration
 from ufl_origami.errors import InputError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import Factorisation, linear_options
 from ufl_origami.solvers.options import option_scope
+from ufl_origami.solvers.weights import shift_weights
 
 log = logging.getLogger(__name__)
 
@@ -31,9 +31,6 @@ SHIFT_FACTOR = 8.0
 
 SHIFT_TRIES = 40
 """Shifts that the guard tries at one tangent."""
-
-SINGULAR = 1e-13
-"""Eigenvalue over the largest ratio of tangent diagonal to weight, below which it is round-off."""
 
 CYCLE = 4
 """Iterations after which one that has not reduced the residual counts as part of a cycle."""
@@ -122,6 +119,7 @@ class NewtonSolver:
 
     Attributes:
         shift: last diagonal shift over the weights, 0 before the first one.
+        shift_weights: those weights.
         report: what the solve under way did so far.
         allowed: negative pivots that the guard leaves alone (to follow an unstable branch).
         pivots: negative pivots of the last tangent, None where unknown.
@@ -138,7 +136,7 @@ class NewtonSolver:
         self._mip = self._guard = self.settings.method == "default"
         self._patience = self.settings.patience
         self._excess = self._unguarded = False  # pivots of the last tangent; left alone before
-        self._shift_weights = shift_weights(problem)
+        self.shift_weights = shift_weights(problem)
         self.shift, self._floor = 0.0, 0.0
         own = {"default": "basic", "newton": "basic"}
         self._full = self._create_snes(own.get(self.settings.method, self.settings.method))
@@ -299,37 +297,16 @@ class NewtonSolver:
         self.linear.zero_pivots = linear.zero_pivots
         return found
 
-    def singular(self) -> bool:
-        """Whether the tangent last factored has an eigenvalue that is zero but for round-off.
-
-        By the factorisation's own count, or by two steps of inverse iteration.
-        """
-        if self.linear.zero_pivots:
-            return True
-        weights, matrix = self._shift_weights, self.problem.tangent.matrix
-        ratio = matrix.getDiagonal()
-        ratio.pointwiseDivide(ratio, weights)
-        first, second, load = weights.duplicate(), weights.duplicate(), weights.copy()
-        first_entry = weights.getOwnershipRange()[0]
-        load.array_w[:] *= np.cos(first_entry + np.arange(len(load.array_r)))
-        self.linear.solve(load, first)
-        load.pointwiseMult(weights, first)
-        self.linear.solve(load, second)
-        square = second.copy()
-        square.pointwiseMult(weights, second)
-        nearest = abs(second.dot(load) / square.dot(second))
-        return bool(nearest <= SINGULAR * ratio.norm(PETSc.NormType.INFINITY))
-
     def _raise_shift(self, linear: Factorisation) -> None:
         matrix = linear.matrix
         diagonal = matrix.getDiagonal()
         if not self.shift:
             ratio = diagonal.copy()
-            ratio.pointwiseDivide(diagonal, self._shift_weights)
+            ratio.pointwiseDivide(diagonal, self.shift_weights)
             self.shift = FIRST_SHIFT * ratio.norm(PETSc.NormType.INFINITY)
         shift = self.shift / SHIFT_FACTOR
         for _ in range(SHIFT_TRIES):
-            matrix.setDiagonal(diagonal + shift * self._shift_weights)
+            matrix.setDiagonal(diagonal + shift * self.shift_weights)
             if not linear.factor():
                 self.shift = shift
                 return
@@ -439,34 +416,3 @@ def require_shortening(snes: PETSc.SNES, line_search: str) -> None:
             f"solver {snes.getType()!r} with line search {line_search!r} may step through an "
             f"obstacle: take 'newtonls' with one of {SHORTENING}"
         )
-
-
-def shift_weights(problem: Problem) -> PETSc.Vec:
-    """Mass-like weights: lumped area at nodes, area squared at angles (rest state).
-
-    Prescribed unknowns weigh nothing: a shift of their unit diagonal would change their values.
-    """
-    vector = area_weights(problem.configuration)
-    vector.array_w[problem.constraints.dofs] = 0.0
-    return vector
-
-
-def area_weights(configuration: Configuration, *, angles: bool = True) -> PETSc.Vec:
-    """Lumped rest area at displacements, area squared (or nothing) at angles."""
-    sheet = configuration.sheet
-    n = sheet.num_owned_cells
-    corners = sheet.rest[sheet.cells[:n]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(normal, axis=1)
-    local = np.zeros(configuration.num_local)
-    for k in range(3):
-        np.add.at(local, 3 * sheet.cells[:n].ravel() + k, np.repeat(area / 3, 3))
-    for name in configuration.edge_unknowns:
-        slot = configuration.slot(name)[sheet.cell_edges[:n]]
-        used = slot >= 0
-        per_edge = area / 3 if name in MIDDLE else angles * area**2
-        weight = np.broadcast_to(per_edge[:, None], slot.shape)[used]
-        np.add.at(local, 3 * configuration.nv + slot[used], weight)
-    vector = configuration.create_vector()
-    configuration.add_to_global(local, vector)
-    return vector

@@ -16,8 +16,9 @@ from slepc4py import SLEPc
 from ufl_origami.errors import SolveError
 from ufl_origami.problem import Problem
 from ufl_origami.solvers.linear import linear_options
-from ufl_origami.solvers.newton import shift_weights
+from ufl_origami.solvers.newton import NewtonSolver
 from ufl_origami.solvers.options import option_scope
+from ufl_origami.solvers.weights import shift_weights
 
 PREFIX = "ufl_origami_modes_"
 
@@ -30,6 +31,9 @@ BESIDE = 1e-13
 
 At zero itself a singular tangent could not be factored.
 """
+
+SINGULAR = 1e-13
+"""Eigenvalue over the largest ratio of tangent diagonal to weight, below which it is round-off."""
 
 ZERO = 1e-9
 """Eigenvalue over the largest of those found, below which its sign may be round-off."""
@@ -157,3 +161,25 @@ def crossing_mode(problem: Problem, x: PETSc.Vec, load: float, level: int, pivot
     if -len(side) <= place < len(side):
         return side[place]
     return min(modes, key=lambda mode: abs(mode.value))  # zero but for round-off
+
+
+def singular(newton: NewtonSolver) -> bool:
+    """Whether the tangent last factored has an eigenvalue that is zero but for round-off.
+
+    By the factorisation's own count, or by two steps of inverse iteration.
+    """
+    if newton.linear.zero_pivots:
+        return True
+    weights, matrix = newton.shift_weights, newton.problem.tangent.matrix
+    ratio = matrix.getDiagonal()
+    ratio.pointwiseDivide(ratio, weights)
+    first, second, load = weights.duplicate(), weights.duplicate(), weights.copy()
+    first_entry = weights.getOwnershipRange()[0]
+    load.array_w[:] *= np.cos(first_entry + np.arange(len(load.array_r)))
+    newton.linear.solve(load, first)
+    load.pointwiseMult(weights, first)
+    newton.linear.solve(load, second)
+    square = second.copy()
+    square.pointwiseMult(weights, second)
+    nearest = abs(second.dot(load) / square.dot(second))
+    return bool(nearest <= SINGULAR * ratio.norm(PETSc.NormType.INFINITY))
