@@ -11,7 +11,7 @@ SAME = "test_ranks_together_and_one_rank_alone_give_the_same_answer"
 ALIKE = "test_ranks_together_and_one_rank_alone_move_alike"
 
 
-def passed(count, *tests):
+def assert_passed(count, *tests):
     """Run tests of this folder on three ranks, each of which must pass."""
     folder = Path(__file__).parent
     words = [
@@ -28,9 +28,9 @@ def passed(count, *tests):
 
 
 def test_three_ranks_agree_too():
-    passed(5, f"test_parallel.py::{SAME}", f"test_time_run.py::{ALIKE}[ddg]")
+    assert_passed(5, f"test_parallel.py::{SAME}", f"test_time_run.py::{ALIKE}[ddg]")
 
 
 @pytest.mark.slow
 def test_three_ranks_agree_on_the_fem_model_too():
-    passed(3, f"test_fem_parallel.py::{SAME}")
+    assert_passed(3, f"test_fem_parallel.py::{SAME}")
